@@ -1,10 +1,16 @@
 // The videos and sounds of patterns: decoded by the browser, videos shown as textures of the models' context, captions told.
 
+/** Videos whose first picture waits, decoded, for their pattern to be found: they start on the spot. More start as they are made: phones
+ * give a page few decoders at once. Set by hand. */
+const READY_VIDEOS = 4;
+
 /** A node's element, and a video's texture. */
 class Player {
   #texture = null;
   #fresh = false;
   #everyTime = false;
+  /** It was to play: until then a video's poster is shown. */
+  begun = false;
 
   constructor(bytes, { kind, loops, onFrame, onEnd }) {
     const seen = kind === 'video';
@@ -18,13 +24,19 @@ class Player {
   #tellFrames(onFrame) {
     const next = () => {
       this.#fresh = true;
-      onFrame();
+      if (this.begun) onFrame();
       this.element.requestVideoFrameCallback?.(next);
     };
     // Without that callback, a frame may be new whenever one is drawn.
     this.#everyTime = !('requestVideoFrameCallback' in this.element);
     if (this.#everyTime) this.element.addEventListener('loadeddata', next);
     else this.element.requestVideoFrameCallback(next);
+  }
+
+  /** From now on it is shown, as it waits. */
+  begin() {
+    this.begun = true;
+    this.#fresh = true;
   }
 
   /** captions: a WebVTT file. onCue: the words that are heard now, '' for none. */
@@ -53,7 +65,7 @@ class Player {
   upload(gl, make) {
     const { element } = this;
     const playing = this.#everyTime && !element.paused;
-    if ((!this.#fresh && !playing) || element.readyState < 2) return;
+    if (!this.begun || (!this.#fresh && !playing) || element.readyState < 2) return;
     this.#fresh = false;
     const unit = gl.getParameter(gl.ACTIVE_TEXTURE);
     const bound = gl.getParameter(gl.TEXTURE_BINDING_2D);
@@ -87,7 +99,7 @@ function transcriptOf(captions) {
   return new DOMParser().parseFromString(words.replace(/<[^>]*>/g, ''), 'text/html').body.textContent;
 }
 
-/** All of a bundle. An element is made when it is first to play: until then a video's poster is shown. */
+/** All of a bundle. The elements of the first videos are made by prepare(), others when they are first to play. */
 export class Media {
   #engine;
   #players = new Map();
@@ -127,6 +139,7 @@ export class Media {
   play(node, tapped) {
     this.#wanted.add(node);
     const player = this.#players.get(node) ?? this.#open(node);
+    if (!player.begun) this.#begin(node, player);
     if (tapped) this.#sound ??= true;
     this.#tune();
     if (!this.#held) player.play();
@@ -141,10 +154,20 @@ export class Media {
         this.#onFrame();
       },
     });
-    const told = this.captionsOf(node);
-    if (told) player.caption(told.captions, told.language, (words) => this.#onCue(node, words, told.language));
     this.#players.set(node, player);
     return player;
+  }
+
+  #begin(node, player) {
+    player.begin();
+    const told = this.captionsOf(node);
+    if (told) player.caption(told.captions, told.language, (words) => this.#onCue(node, words, told.language));
+  }
+
+  /** Makes the first videos, paused at their beginning, once the bundle's bytes are there. */
+  prepare() {
+    const videos = this.#engine.nodes.flatMap(({ kind }, node) => (kind === 'video' ? [node] : []));
+    for (const node of videos.slice(0, READY_VIDEOS)) if (!this.#players.has(node)) this.#open(node);
   }
 
   pause(node) {
@@ -187,6 +210,7 @@ export class Media {
   }
 
   upload(gl) {
+    this.prepare();  // again, after close()
     for (const [node, player] of this.#players) {
       if (this.#engine.nodes[node].kind === 'video') player.upload(gl, () => this.#engine.videoTexture(node));
     }

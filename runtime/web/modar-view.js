@@ -56,7 +56,7 @@ export class View extends EventTarget {
   #redraw = () => {};
   #mirror = false;
   /** Of media.js, which is loaded where a bundle has videos or sounds. */
-  #media = { sound: false, held: false, ended: [], captionsOf: () => null, pause() {}, upload() {}, close() {}, forget() {} };
+  #media = { sound: false, held: false, ended: [], captionsOf: () => null, prepare() {}, pause() {}, upload() {}, close() {}, forget() {} };
   #taps = [];
   #drawnAt = 0;
   #handle = 0;
@@ -120,6 +120,7 @@ export class View extends EventTarget {
 
   #finish() {
     this.#upload();
+    this.#media.prepare();
     this.#complete = true;
     performance.mark('modar: whole');
   }

@@ -6,9 +6,10 @@
                                 pixel of the plane is from the film's own, of 255
 
 Prints JSON:
-  start_ms       from the first frame in which the picture is seen to the first one that shows the film
-  edge_px        how far the corners of a film as large as the picture lie from the picture's true ones: median, 95th percentile, greatest,
-                 and the share within half a pixel
+  start_ms       from the first frame in which the picture is seen to the first one that shows the film, and to the first one in which it moves
+  edge_px        how far the corners of a film as large as the picture lie from the picture's true ones in that very frame, whose number is
+                 written into it: median, 95th percentile, greatest, the share within half a pixel, and each frame that is farther
+                 (number, since how many drawn frames the picture is seen, distance)
   cpu_ms         of all of the browser's processes for a drawn frame: without a film, with one of 480 lines that is held (the plane's own
                  cost), and with one that plays (decoding and upload as well); ratios to the first
 Needs MODAR_BIN (build/release/bin by default), ffmpeg and chromium.
@@ -47,27 +48,38 @@ pattern = "cover"
 name = "corner"
 """
 FILM = '[[scene.video]]\nfile = "film.mp4"\nscale = 1\ncentred = true\nloop = true\n'
-# Every drawn frame: when, whether the picture is seen, its corners by the drawn pose, and whether the film has been uploaded.
+# A frame's number is written into its first row of BITS squares of BIT pixels, the lowest bit first.
+BITS, BIT = 9, 16
+# Every drawn frame: when, its number, whether the picture is seen, its corners by the drawn pose; when the film was uploaded first, and moved.
 WATCH = """(async () => {
   globalThis.drawn = [];
-  globalThis.uploaded = 0;
+  globalThis.uploaded = [0, 0];
   for (const { prototype } of [WebGLRenderingContext, WebGL2RenderingContext]) {
     const upload = prototype.texImage2D;
     prototype.texImage2D = function (...given) {
-      if (given.at(-1) instanceof HTMLVideoElement && given.at(-1).src.startsWith('blob:')) uploaded ||= performance.now();
+      if (given.at(-1) instanceof HTMLVideoElement && given.at(-1).src.startsWith('blob:')) {
+        uploaded[0] ||= performance.now();
+        if (given.at(-1).currentTime > 0) uploaded[1] ||= performance.now();
+      }
       return upload.apply(this, given);
     };
   }
-  const { View } = await import('/modar-view.js');
+  const strip = Object.assign(document.createElement('canvas'), { width: BITS * BIT, height: BIT }).getContext('2d', { willReadFrequently: true });
+  const numberOf = (source) => {
+    strip.drawImage(source, 0, 0);
+    const { data } = strip.getImageData(0, BIT / 2, BITS * BIT, 1);
+    return Array.from({ length: BITS }, (_, i) => (data[4 * (i * BIT + BIT / 2)] > 127 ? 2 ** i : 0)).reduce((sum, each) => sum + each);
+  };
+  const { View } = await import('/app.js');  // as it comes: its modules are one file
   const draw = View.prototype.draw;
   View.prototype.draw = function (detail, ...rest) {
-    const { poses, camera: { focal, width, height } } = detail;
+    const { source, poses, camera: { focal, width, height } } = detail;
     const view = poses.slice(24, 40);
     const corners = [[-1, 1], [1, 1], [1, -1], [-1, -1]].map(([x, y]) => {
       const at = [0, 1, 2].map((i) => view[i] * x * SIDES[0] + view[4 + i] * y * SIDES[1] + view[12 + i]);
       return [width / 2 - 0.5 - focal * at[0] / at[2], height / 2 - 0.5 + focal * at[1] / at[2]];
     });
-    drawn.push({ at: performance.now(), seen: poses[0] !== 0, corners });
+    drawn.push({ at: performance.now(), number: numberOf(source), source: source.constructor.name, seen: poses[0] !== 0, corners });
     return draw.call(this, detail, ...rest);
   };
   document.getElementById('start').click();
@@ -148,12 +160,12 @@ def visit(folder, seconds, held=False):
         browser.camera("granted")
         browser.resize(WIDTH, HEIGHT)
         browser.open(server.url)
-        browser.wait("document.getElementById('start').textContent !== ''", "the page")
-        browser.run(WATCH.replace("SIDES", json.dumps(sides(folder))))
+        browser.wait("document.getElementById('start').textContent !== '' && performance.getEntriesByName('modar: whole').length > 0", "the page")
+        browser.run(re.sub(r"\b(SIDES|BITS|BIT)\b", lambda word: {"SIDES": json.dumps(sides(folder)), "BITS": str(BITS), "BIT": str(BIT)}[word[0]], WATCH))
         browser.wait("drawn.some(({ seen }) => seen)", "the picture")
         time.sleep(1)
         if held:
-            browser.wait("uploaded > 0", "the film")
+            browser.wait("uploaded[1] > 0", "the film")
             browser.run("part('pause').click()")
             time.sleep(0.5)
         before, count = cpu_seconds(browser.process.pid), browser.run("drawn.length")
@@ -175,11 +187,16 @@ def sides(folder):
 
 
 def corner_errors(drawn, truth):
-    """Of each drawn frame that shows the picture: of its four corners, in the frame of the clip that it must be."""
-    errors = []
+    """Of each drawn frame that shows the picture: (distance, its number, frames since it was found, number and distance of the nearest truth)."""
+    def distance(frame, corners):
+        return max(abs(complex(*a) - complex(*b)) for a, b in zip(frame["corners"], corners))
+
+    errors, since = [], 0
     for frame in drawn:
-        if frame["seen"]:
-            errors.append(min((max(abs(complex(*a) - complex(*b)) for a, b in zip(frame["corners"], corners)) for corners in truth)))
+        since = since + 1 if frame["seen"] else 0
+        if since:
+            nearest = min(range(len(truth)), key=lambda number: distance(frame, truth[number]))
+            errors.append((distance(frame, truth[frame["number"]]), frame["number"], since - 1, nearest, distance(frame, truth[nearest]), frame["source"]))
     return sorted(errors)
 
 
@@ -247,10 +264,14 @@ def main():
         rows = [line.split(",") for line in (folder / "clip/truth.csv").read_text().splitlines()[1:]]
         count = next((i for i, row in enumerate(rows) if not int(row[-1])), len(rows))
         truth = [[tuple(map(float, row[i:i + 2])) for i in range(1, 9, 2)] for row in rows[:count]]
-        for i, number in enumerate([*range(count), *range(count - 2, 0, -1)]):
+        order = [*range(count), *range(count - 2, 0, -1)]
+        truth = [truth[number] for number in order]
+        for i, number in enumerate(order):
             (folder / f"clip/to_and_fro_{i:05}.png").symlink_to(f"frame_{number:05}.png")
-        subprocess.run(["ffmpeg", "-loglevel", "error", "-r", "15", "-i", folder / "clip/to_and_fro_%05d.png", "-pix_fmt", "yuv420p",
-                        folder / "camera.y4m"], check=True)
+        box = f"drawbox=y=0:w={BIT}:h={BIT}:t=fill"
+        bits = [f"{box}:x={i * BIT}:c={colour}:enable='eq(mod(floor(n/{2 ** i}),2),{on})'" for i in range(BITS) for on, colour in enumerate(("black", "white"))]
+        subprocess.run(["ffmpeg", "-loglevel", "error", "-r", "15", "-i", folder / "clip/to_and_fro_%05d.png", "-vf", ",".join(bits), "-pix_fmt",
+                        "yuv420p", folder / "camera.y4m"], check=True)
         subprocess.run(["ffmpeg", "-loglevel", "error", "-f", "lavfi", "-i", "testsrc2=s=854x480:r=25:d=10", "-pix_fmt", "yuv420p", folder / "film.mp4"],
                        check=True)
         bake(folder, PROJECT)
@@ -260,10 +281,10 @@ def main():
         _, _, held = visit(folder, options.seconds, held=True)
         errors = corner_errors(drawn, truth)
         found = next(frame["at"] for frame in drawn if frame["seen"])
-        print(json.dumps({"start_ms": round(uploaded - found, 1), "edge_px": {
-            "median": round(statistics.median(errors), 3), "p95": round(errors[int(0.95 * len(errors))], 3), "greatest": round(errors[-1], 3),
-            "within_half": round(sum(error <= 0.5 for error in errors) / len(errors), 3),
-            "frames": len(errors)}, "cpu_ms": {
+        print(json.dumps({"start_ms": [round(at - found, 1) for at in uploaded], "edge_px": {
+            "median": round(statistics.median(error for error, *_ in errors), 3), "p95": round(errors[int(0.95 * len(errors))][0], 3),
+            "greatest": round(errors[-1][0], 3), "within_half": round(sum(error <= 0.5 for error, *_ in errors) / len(errors), 3),
+            "frames": len(errors), "farther": [(round(error, 2), *more) for error, *more in errors if error > 0.5]}, "cpu_ms": {
                 "without": round(1000 * without, 1), "held": round(1000 * held, 1), "playing": round(1000 * playing, 1),
                 "held_ratio": round(held / without, 3), "playing_ratio": round(playing / without, 3)}}))
 

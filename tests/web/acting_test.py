@@ -99,6 +99,27 @@ PIXEL = """new Promise((resolve) => {
     return send.call(this, event);
   };
 })"""
+# Before the page's own scripts: its films, and what is uploaded of them while a frame is drawn.
+WATCH_FILMS = """(() => {
+  globalThis.films = [];
+  globalThis.drawings = [];
+  const create = document.createElement;
+  document.createElement = function (name) {
+    const made = create.call(this, name);
+    if (name === 'video') films.push(made);
+    return made;
+  };
+  for (const { prototype } of [WebGLRenderingContext, WebGL2RenderingContext]) {
+    const upload = prototype.texImage2D;
+    prototype.texImage2D = function (...given) {
+      upload.apply(this, given);
+      if (!films.includes(given.at(-1))) return;
+      const texture = this.getParameter(this.TEXTURE_BINDING_2D);
+      globalThis.filmTextureIsThere = () => this.isTexture(texture);
+      if (drawings.length > 0) ++drawings.at(-1).uploads;
+    };
+  }
+})()"""
 # A click where nobody drags.
 CLICK = """(() => {
   const canvas = part('models');
@@ -227,27 +248,25 @@ class Acting(ProgramTest):
 
     def test_a_video_plays_where_it_stands(self):
         self.browser.resize(640, 480)
+        watch = self.browser.call("Page.addScriptToEvaluateOnNewDocument", source=WATCH_FILMS)["identifier"]
+        self.addCleanup(self.browser.call, "Page.removeScriptToEvaluateOnNewDocument", identifier=watch)
         self.browser.open(self.server.url)
-        self.browser.wait("document.getElementById('start').textContent !== ''", "the cover")
-        self.browser.run("""(() => {
-          globalThis.films = [];
-          const create = document.createElement;
-          document.createElement = function (name) {
-            const made = create.call(this, name);
-            if (name === 'video') films.push(made);
-            return made;
+        self.browser.wait("films[0]?.readyState >= 2", "a film whose first picture waits, on the cover")
+        self.assertEqual(self.browser.run("[films[0].paused, films[0].currentTime]"), [True, 0])
+        self.browser.run("""(async () => {
+          const { View } = await import('/app.js');
+          const draw = View.prototype.draw;
+          View.prototype.draw = function (detail, ...rest) {
+            drawings.push({ seen: detail.poses[1] !== 0, still: films.every(({ paused }) => paused), uploads: 0 });
+            return draw.call(this, detail, ...rest);
           };
-          for (const { prototype } of [WebGLRenderingContext, WebGL2RenderingContext]) {
-            const upload = prototype.texImage2D;
-            prototype.texImage2D = function (...given) {
-              upload.apply(this, given);
-              if (!films.includes(given.at(-1))) return;
-              const texture = this.getParameter(this.TEXTURE_BINDING_2D);
-              globalThis.filmTextureIsThere = () => this.isTexture(texture);
-            };
-          }
           document.getElementById('start').click();
         })()""")
+        self.browser.wait("drawings.some(({ seen }) => seen)", "the picture")
+        drawings = self.browser.run("drawings")
+        found = next(i for i, drawing in enumerate(drawings) if drawing["seen"])
+        self.assertEqual({(drawing["still"], drawing["uploads"]) for drawing in drawings[:found]} - {(True, 0)}, set())
+        self.assertGreater(drawings[found]["uploads"], 0, "the frame that finds the picture shows the film")
         self.browser.wait("globalThis.films?.[0]?.currentTime > 0.2", "the film")
         self.assertEqual(self.browser.run("[films.length, films[0].muted, films[0].loop, films[0].videoWidth]"), [1, True, True, 64])
         began = self.browser.run("""(async () => {
