@@ -93,7 +93,7 @@ export class Source {
         const chunk = await this.#read().catch((cause) => {
           error = cause instanceof ModarError ? cause : this.#failed(`the network broke off after ${this.#taken} bytes`);
         });
-        if (!error && chunk === null && this.#taken === this.#first && this.#first > 0) {
+        if (!error && chunk === null && this.#taken === this.#first && this.#taken < this.total) {
           this.#reader = null;  // now the rest
           continue;
         }
