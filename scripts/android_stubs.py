@@ -4,7 +4,7 @@ Android's own api/current.txt: what android.jar is for a compiler.
 
   scripts/android_stubs.py current.txt APP_SOURCES STUBS
 
-Members whose types are not among the classes written (or java.*) are left out. Methods throw.
+Members whose types are not among the classes written (or of java.* as of Java 7) are left out. Methods throw.
 """
 import argparse
 import pathlib
@@ -13,6 +13,7 @@ import re
 # Innermost annotations first: one may hold others.
 ANNOTATION = re.compile(r"@(?!interface)[\w.]+(?:\((?:[^()@\"]|\"[^\"]*\")*\)|(?![\w.(]))\s*")
 TYPE_NAME = re.compile(r"[A-Za-z_][\w]*(?:\.[A-Za-z_]\w*)+")
+JAVA_7 = re.compile(r"java\.(?!time\.|util\.(?:function|stream)\.)")
 HEAD = re.compile(r"^(?P<words>(?:\w+ )*?)(?P<kind>class|interface|enum|@interface) (?P<name>[\w.]+)(?P<generics><.*?>)?"
                   r"(?: extends (?P<base>.*?))?(?: implements (?P<faces>.*?))? \{$")
 BOXES = {"boolean": "Boolean", "byte": "Byte", "char": "Character", "short": "Short", "int": "Integer", "long": "Long",
@@ -65,7 +66,7 @@ class Stubs:
         self.want(name.rpartition(".")[0])
 
     def known(self, text):
-        return all(name.startswith("java.") or name in self.wanted for name in TYPE_NAME.findall(text))
+        return all(JAVA_7.match(name) or name in self.wanted for name in TYPE_NAME.findall(text))
 
     def call_of_base(self, name):
         base = self.classes[name][0]["base"]

@@ -57,6 +57,7 @@ struct Session {
   std::vector<modar_event> events;  ///< taps since the last frame, then what is seen in it
   std::vector<modar_item> items;
   std::size_t item_count = 0;  ///< that were drawn last
+  bool alone = true;           ///< nothing but the renderer draws in GLSurfaceView's context
   std::vector<float> poses;    ///< on which these stand, as org.modar.Poses has them
   Gesture gesture;
 };
@@ -134,6 +135,8 @@ jlong opened(JNIEnv* env, modar_bundle* bundle, const modar_error& error) {
   auto session = std::make_shared<Session>();
   session->bundle = bundle;
   session->actions = modar_actions_create(bundle, nullptr);
+  auto media = modar::sized<modar_media>();
+  session->alone = modar_media_at(bundle, 0, &media) == 0;
   session->items.resize(modar_scene_count(bundle) + modar_node_count(bundle) + 1,
                         modar::sized<modar_item>());
   return sessions().add(std::move(session));
@@ -426,6 +429,13 @@ std::array<float, 2> on_screen(const Session& session, double x, double y) {
           static_cast<float>((xx * y - yx * x) / area)};
 }
 
+void set_options(const Session& session) {
+  auto options = modar::sized<modar_render_options>();
+  modar_render_options_default(&options);
+  options.exclusive = session.alone ? 1 : 0;
+  modar_renderer_set_options(session.renderer, &options);
+}
+
 /// False and an exception where there is no renderer or no surface yet.
 bool can_draw(JNIEnv* env, const Session& session) {
   if (session.renderer != nullptr && session.surface.width > 0) return true;
@@ -654,12 +664,7 @@ MODAR_NATIVE(void, onSurfaceCreated)
   session->renderer = modar_renderer_create(session->bundle,
                                             profile.empty() ? nullptr : profile.c_str(), 0, &error);
   if (session->renderer == nullptr) return throw_error(env, error);
-  auto options = modar::sized<modar_render_options>();
-  modar_render_options_default(&options);
-  // GLSurfaceView's context is the app's alone; pictures of videos are copied in it.
-  auto media = modar::sized<modar_media>();
-  options.exclusive = modar_media_at(session->bundle, 0, &media) != 0 ? 0 : 1;
-  modar_renderer_set_options(session->renderer, &options);
+  set_options(*session);
 }
 
 MODAR_NATIVE(void, onSurfaceChanged)
@@ -889,6 +894,13 @@ MODAR_NATIVE(void, setVideo)(JNIEnv* env, jclass, jlong number, jint node, jint 
   if (!session || session->renderer == nullptr) return;
   modar_renderer_set_video(session->renderer, static_cast<std::uint32_t>(node),
                            static_cast<std::uint32_t>(texture));
+}
+
+MODAR_NATIVE(void, share)(JNIEnv* env, jclass, jlong number) {
+  const Use session(env, number, &Session::drawing);
+  if (!session) return;
+  session->alone = false;
+  if (session->renderer != nullptr) set_options(*session);
 }
 
 MODAR_NATIVE(jlong, gpuBytes)(JNIEnv* env, jclass, jlong number) {

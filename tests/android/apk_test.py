@@ -19,7 +19,9 @@ from servers import NGINX, Nginx  # noqa: E402
 
 TOOLS = ("javac", "aapt", "aapt2", "zipalign", "apksigner", "jarsigner", "dexdump", "keytool", "proguard")
 GOLDEN = ROOT / "tests" / "golden" / "v1_0.modar"
-MAX_DEX = 58_000  # 37,000 before the look without the camera, photos, texts by language; 46,000 before videos and sounds; 54,000 before marks
+# 37,000 before the look without the camera, photos, texts by language; 46,000 before videos and sounds; 54,000 before marks of labels;
+# 56,400 before recordings
+MAX_DEX = 66_000
 
 
 def run(*words, **options):

@@ -17,7 +17,8 @@ from programs import COVERED, READINGS, SEEN, TURNED, TURNS, write_turns  # noqa
 
 BRIDGE = ["Native", "ModarException", "Poses", "Gyroscope", "Media", "VideoCopy"]
 SENSORS = ["hardware/Sensor", "hardware/SensorEvent", "hardware/SensorEventListener", "hardware/SensorManager", "os/Handler",
-           "os/Looper", "os/Message", "media/MediaPlayer", "graphics/SurfaceTexture", "view/Surface", "opengl/GLES20", "opengl/GLES11Ext"]
+           "os/Looper", "os/Message", "media/MediaPlayer", "media/MediaExtractor", "media/MediaFormat", "media/MediaCodec", "media/MediaCrypto",
+           "graphics/SurfaceTexture", "view/Surface", "opengl/GLES20", "opengl/GLES11Ext"]
 FLOATS = 40
 
 

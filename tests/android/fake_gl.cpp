@@ -17,8 +17,24 @@ struct Surface {
   EGLContext context = EGL_NO_CONTEXT;
   int width = 0;
   int height = 0;
+  GLuint window = 0;
 };
 thread_local Surface current;
+
+/// A framebuffer with colour alone, which is bound then.
+GLuint make_window(int width, int height) {
+  GLuint colour = 0;
+  GLuint window = 0;
+  glGenTextures(1, &colour);
+  glBindTexture(GL_TEXTURE_2D, colour);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glBindTexture(GL_TEXTURE_2D, 0);
+  glGenFramebuffers(1, &window);
+  glBindFramebuffer(GL_FRAMEBUFFER, window);
+  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, colour, 0);
+  return window;
+}
 
 }  // namespace
 
@@ -39,20 +55,11 @@ FAKE_GL(void, create)(JNIEnv*, jclass, jint width, jint height) {
   const std::array<EGLint, 3> version = {EGL_CONTEXT_CLIENT_VERSION, 2, EGL_NONE};
   made.context = eglCreateContext(made.display, config, EGL_NO_CONTEXT, version.data());
   if (!eglMakeCurrent(made.display, EGL_NO_SURFACE, EGL_NO_SURFACE, made.context)) std::abort();
-  GLuint colour = 0;
   GLuint depth = 0;
-  GLuint window = 0;
-  glGenTextures(1, &colour);
-  glBindTexture(GL_TEXTURE_2D, colour);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-  glBindTexture(GL_TEXTURE_2D, 0);
+  made.window = make_window(width, height);
   glGenRenderbuffers(1, &depth);
   glBindRenderbuffer(GL_RENDERBUFFER, depth);
   glRenderbufferStorage(GL_RENDERBUFFER, GL_DEPTH_COMPONENT24_OES, width, height);
-  glGenFramebuffers(1, &window);
-  glBindFramebuffer(GL_FRAMEBUFFER, window);
-  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, colour, 0);
   glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, depth);
   if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) std::abort();
   current = made;
@@ -68,6 +75,21 @@ FAKE_GL(void, destroy)(JNIEnv*, jclass) {
 FAKE_GL(void, read)(JNIEnv* env, jclass, jobject rgba) {
   glReadPixels(0, 0, current.width, current.height, GL_RGBA, GL_UNSIGNED_BYTE,
                env->GetDirectBufferAddress(rgba));
+}
+
+// The input of an encoder is a window as well.
+FAKE_GL(jint, window)(JNIEnv*, jclass, jint width, jint height) {
+  const GLuint window = make_window(width, height);
+  glBindFramebuffer(GL_FRAMEBUFFER, current.window);
+  return static_cast<jint>(window);
+}
+
+FAKE_GL(void, use)(JNIEnv*, jclass, jint window) {
+  glBindFramebuffer(GL_FRAMEBUFFER, window == 0 ? current.window : static_cast<GLuint>(window));
+}
+
+FAKE_GL(void, pixels)(JNIEnv* env, jclass, jint width, jint height, jobject rgba) {
+  glReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, env->GetDirectBufferAddress(rgba));
 }
 
 FAKE_GL(void, clear)(JNIEnv*, jclass, jfloat gray) {
@@ -170,6 +192,17 @@ GLES20(void, glTexImage2D)
  jint format, jint type, jobject pixels) {
   const void* bytes = pixels == nullptr ? nullptr : env->GetDirectBufferAddress(pixels);
   glTexImage2D(word(target), level, inside, width, height, border, word(format), word(type), bytes);
+}
+GLES20(void, glCopyTexImage2D)
+(JNIEnv*, jclass, jint target, jint level, jint inside, jint x, jint y, jint width, jint height,
+ jint border) {
+  glCopyTexImage2D(target_of(target), level, word(inside), x, y, width, height, border);
+}
+GLES20(void, glDeleteTextures)(JNIEnv* env, jclass, jint, jintArray names, jint offset) {
+  jint name = 0;
+  env->GetIntArrayRegion(names, offset, 1, &name);
+  const auto texture = static_cast<GLuint>(name);
+  glDeleteTextures(1, &texture);
 }
 GLES20(void, glGetIntegerv)(JNIEnv* env, jclass, jint name, jintArray values, jint offset) {
   GLint value = 0;

@@ -18,6 +18,14 @@ public final class GlContext {
     /** RGBA from the bottom up, of the whole surface. */
     public static native void read(ByteBuffer rgba);
 
+    /** A further window of that size, which use() makes the current one; 0 is the screen's. */
+    public static native int window(int width, int height);
+
+    public static native void use(int window);
+
+    /** RGBA from the bottom up, of the current window. */
+    public static native void pixels(int width, int height, ByteBuffer rgba);
+
     public static native void clear(float gray);
 
     public static native String string(int name);

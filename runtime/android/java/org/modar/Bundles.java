@@ -11,6 +11,7 @@ import java.io.FileInputStream;
 import java.io.FileOutputStream;
 import java.io.IOException;
 import java.io.InputStream;
+import java.io.OutputStream;
 import java.io.StringReader;
 import java.util.ArrayList;
 import java.util.Arrays;
@@ -189,11 +190,16 @@ final class Bundles {
 
     /** All of a file, which is closed. */
     static byte[] bytes(InputStream in) throws IOException {
+        ByteArrayOutputStream all = new ByteArrayOutputStream();
+        copy(in, all);
+        return all.toByteArray();
+    }
+
+    /** Closes `in` alone. */
+    static void copy(InputStream in, OutputStream out) throws IOException {
         try {
-            ByteArrayOutputStream all = new ByteArrayOutputStream();
             byte[] part = new byte[1 << 12];
-            for (int got = in.read(part); got > 0; got = in.read(part)) all.write(part, 0, got);
-            return all.toByteArray();
+            for (int got = in.read(part); got > 0; got = in.read(part)) out.write(part, 0, got);
         } finally {
             in.close();
         }

@@ -48,6 +48,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     private static final int CAPTION_MS = 100;
     private static final int CAPTION = 8;
     private static final int MARKS = 9;
+    private static final int RECORDING = 10;
 
     private final Handler main = new Handler(Looper.getMainLooper(), this);
     private Diagnostics diagnostics;
@@ -108,6 +109,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         caption = (TextView) findViewById(R.id.caption);
         setVolumeControlStream(AudioManager.STREAM_MUSIC);
         label(R.id.picture, "picture");
+        label(R.id.record, "record");
         label(R.id.share, "share");
         label(R.id.around, "around");
         label(R.id.models, "models");
@@ -163,9 +165,12 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
             case MARKS:
                 if (marks != null) marks.follow();
                 break;
+            case RECORDING:
+                label(R.id.record, message.arg1 != 0 ? "stop" : "record");
+                break;
             case SAVED:
                 showIf(findViewById(R.id.share), true);
-                notice(words.get("saved"));
+                notice(words.get((String) message.obj));
                 break;
             default:
                 findViewById(R.id.update).setEnabled(true);
@@ -203,6 +208,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         main.removeMessages(CAPTION);
         if (media != null) media.hold(true);
         stopCamera();
+        stage.endRecording();
         view.onPause();
         closeCamera();
         keepFocal();
@@ -459,7 +465,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         main.obtainMessage(FETCHED, changed ? 1 : 0, 0).sendToTarget();
     }
 
-    /** What takes a while, on a thread of its own: to verify a bundle, to fetch, to save a picture. */
+    /** What takes a while, on a thread of its own: to verify a bundle, to fetch, to save a picture or a video. */
     private final class Job extends Thread {
         private final Object of;
 
@@ -472,7 +478,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         public void run() {
             if (of instanceof Bundles.Source) verify((Bundles.Source) of);
             if (of instanceof Update) fetch((Update) of);
-            if (of instanceof Bitmap) save((Bitmap) of);
+            if (of instanceof Bitmap || of instanceof File) save(of);
         }
     }
 
@@ -718,6 +724,9 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
             case R.id.picture:
                 stage.takePicture();
                 break;
+            case R.id.record:
+                stage.record(getCacheDir());
+                break;
             case R.id.share:
                 share();
                 break;
@@ -765,10 +774,26 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         new Job("modar-picture", bitmap).start();
     }
 
-    private void save(Bitmap bitmap) {
+    /** On GL's thread: a video begins or ends. */
+    void recording(boolean on) {
+        main.obtainMessage(RECORDING, on ? 1 : 0, 0).sendToTarget();
+    }
+
+    /** On GL's thread. */
+    void recorded(File video) {
+        new Job("modar-video", video).start();
+    }
+
+    /** From any thread. */
+    void notRecorded(Exception cause) {
+        diagnostics.error(String.valueOf(cause.getMessage()));
+        say(NOTICE, words.get("not-recorded", cause.getMessage()));
+    }
+
+    private void save(Object what) {
         try {
-            photos.save(bitmap);
-            main.sendEmptyMessage(SAVED);
+            photos.save(what);
+            main.obtainMessage(SAVED, what instanceof File ? "saved-video" : "saved").sendToTarget();
         } catch (IOException failed) {
             diagnostics.error(failed.getMessage());
             say(NOTICE, words.get("space", failed.getMessage()));
@@ -776,6 +801,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
             diagnostics.error(refused.getMessage());
             say(NOTICE, words.get("space", refused.getMessage()));
         }
+        if (what instanceof File) ((File) what).delete();
     }
 
     private void share() {

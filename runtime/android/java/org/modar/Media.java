@@ -1,6 +1,7 @@
 package org.modar;
 
 import android.graphics.SurfaceTexture;
+import android.media.MediaExtractor;
 import android.media.MediaPlayer;
 import android.opengl.GLES11Ext;
 import android.opengl.GLES20;
@@ -44,7 +45,7 @@ final class Media implements MediaPlayer.OnPreparedListener, MediaPlayer.OnCompl
     private final File folder;
     private final Runnable redraw;
     private final List<Player> players = new ArrayList<>();
-    private final VideoCopy copy = new VideoCopy();
+    private final VideoCopy copy = new VideoCopy(GLES11Ext.GL_TEXTURE_EXTERNAL_OES);
     private final float[] map = new float[16];
     private boolean held;
     private boolean sound;
@@ -91,24 +92,57 @@ final class Media implements MediaPlayer.OnPreparedListener, MediaPlayer.OnCompl
         return null;
     }
 
-    private void open(Player player) throws ModarException {
-        MediaPlayer decoder = new MediaPlayer();
+    /** Hands a node's file over. What takes it has its descriptor: the file itself is gone after that. */
+    private void give(int node, MediaPlayer decoder, MediaExtractor reader) throws IOException, ModarException {
+        File file = File.createTempFile("media", ".mp4", folder);
         try {
-            File file = File.createTempFile("media", ".mp4", folder);
             FileOutputStream out = new FileOutputStream(file);
             try {
-                ByteBuffer bytes = Native.media(session, player.node);
+                ByteBuffer bytes = Native.media(session, node);
                 while (bytes.hasRemaining()) out.getChannel().write(bytes);
             } finally {
                 out.close();
             }
             FileInputStream in = new FileInputStream(file);
             try {
-                decoder.setDataSource(in.getFD());
+                if (decoder != null) decoder.setDataSource(in.getFD());
+                else reader.setDataSource(in.getFD());
             } finally {
                 in.close();
-                file.delete();
             }
+        } finally {
+            file.delete();
+        }
+    }
+
+    /** The node that is heard now, whose place in its file becomes ms[0]; -1: none. */
+    synchronized int heard(int[] ms) {
+        for (Player each : players) {
+            if (!sound || !each.prepared || each.about[Native.HAS_SOUND] == 0 || !each.decoder.isPlaying()) continue;
+            ms[0] = each.decoder.getCurrentPosition();
+            return each.node;
+        }
+        return -1;
+    }
+
+    /** Of a node that is heard; null where the phone cannot read it. */
+    MediaExtractor reader(int node) {
+        MediaExtractor reader = new MediaExtractor();
+        try {
+            give(node, null, reader);
+            return reader;
+        } catch (IOException full) {
+            reader.release();
+        } catch (ModarException closed) {
+            reader.release();
+        }
+        return null;
+    }
+
+    private void open(Player player) throws ModarException {
+        MediaPlayer decoder = new MediaPlayer();
+        try {
+            give(player.node, decoder, null);
         } catch (IOException full) {
             decoder.release();
             player.wanted = false;

@@ -196,6 +196,9 @@ public final class Native {
     /** What a video shows from now on: a 2D texture of the context, its first row on top; 0: its poster. On GL's thread. */
     public static native void setVideo(long session, int node, int texture) throws ModarException;
 
+    /** From now on others draw in the context as well, as the copies of videos do: the renderer sets its state anew. On GL's thread. */
+    public static native void share(long session) throws ModarException;
+
     /** GL memory that the bundle takes. */
     public static native long gpuBytes(long session) throws ModarException;
 }

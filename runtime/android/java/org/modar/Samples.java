@@ -5,15 +5,16 @@ import javax.microedition.khronos.egl.EGL10;
 import javax.microedition.khronos.egl.EGLConfig;
 import javax.microedition.khronos.egl.EGLDisplay;
 
-/** A surface with four samples a pixel, so that edges are smooth; with one where there is no such surface. */
+/** A surface with four samples a pixel, so that edges are smooth, and like those of video encoders; without either where there is none. */
 final class Samples implements GLSurfaceView.EGLConfigChooser {
     private static final int ES2 = 4; // EGL_OPENGL_ES2_BIT
+    private static final int RECORDABLE = 0x3142; // EGL_RECORDABLE_ANDROID
 
     @Override
     public EGLConfig chooseConfig(EGL10 egl, EGLDisplay display) {
-        for (int samples = 4; samples >= 0; samples -= 4) {
+        for (int i = 0; i < 4; i++) {
             int[] wanted = {EGL10.EGL_RENDERABLE_TYPE, ES2, EGL10.EGL_RED_SIZE, 8, EGL10.EGL_GREEN_SIZE, 8, EGL10.EGL_BLUE_SIZE, 8,
-                    EGL10.EGL_DEPTH_SIZE, 16, EGL10.EGL_SAMPLES, samples, EGL10.EGL_NONE};
+                    EGL10.EGL_DEPTH_SIZE, 16, EGL10.EGL_SAMPLES, i < 2 ? 4 : 0, i % 2 == 0 ? RECORDABLE : EGL10.EGL_NONE, 1, EGL10.EGL_NONE};
             EGLConfig[] found = new EGLConfig[1];
             int[] count = new int[1];
             if (egl.eglChooseConfig(display, wanted, found, 1, count) && count[0] > 0) return found[0];

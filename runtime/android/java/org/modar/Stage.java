@@ -2,6 +2,7 @@ package org.modar;
 
 import android.opengl.GLES20;
 import android.opengl.GLSurfaceView;
+import java.io.File;
 import java.nio.ByteBuffer;
 import java.util.concurrent.atomic.AtomicReference;
 import javax.microedition.khronos.egl.EGLConfig;
@@ -43,6 +44,8 @@ final class Stage implements GLSurfaceView.Renderer {
     private int height;
     private int turned = -1;
     private String profile;
+    /** Null: no video is recorded. */
+    private Recorder recorder;
 
     Stage(GLSurfaceView view, MainActivity screen, Diagnostics diagnostics) {
         this.view = view;
@@ -97,6 +100,28 @@ final class Stage implements GLSurfaceView.Renderer {
     void takePicture() {
         wantsPicture = true;
         view.requestRender();
+    }
+
+    /** Begins a video in a folder, or ends the one that is recorded. */
+    void record(final File folder) {
+        view.queueEvent(new Runnable() {
+            @Override
+            public void run() {
+                if (recorder != null) stopRecording(false);
+                else startRecording(folder);
+            }
+        });
+        view.requestRender();
+    }
+
+    /** Before GL pauses: what is recorded is saved. */
+    void endRecording() {
+        view.queueEvent(new Runnable() {
+            @Override
+            public void run() {
+                stopRecording(false);
+            }
+        });
     }
 
     /** With the camera stopped and GL paused, or before a new bundle: all frames go back. */
@@ -157,10 +182,12 @@ final class Stage implements GLSurfaceView.Renderer {
         diagnostics.gl = renderer + "; " + gl.glGetString(GL10.GL_VERSION);
         diagnostics.profile = profile == null ? "none, the context's own limits" : profile;
         prepared = 0;
+        stopRecording(true);
     }
 
     @Override
     public void onSurfaceChanged(GL10 gl, int newWidth, int newHeight) {
+        if (newWidth != width || newHeight != height) stopRecording(false);
         width = newWidth;
         height = newHeight;
         turned = -1;
@@ -203,11 +230,45 @@ final class Stage implements GLSurfaceView.Renderer {
             return;
         }
         diagnostics.drawn(System.nanoTime() - start);
+        record();
         if (wantsPicture) {
             wantsPicture = false;
             ByteBuffer rgba = ByteBuffer.allocateDirect(4 * width * height);
             GLES20.glReadPixels(0, 0, width, height, GLES20.GL_RGBA, GLES20.GL_UNSIGNED_BYTE, rgba);
             screen.picture(rgba, width, height);
+        }
+    }
+
+    private void startRecording(File folder) {
+        if (session == 0 || width == 0) return;
+        try {
+            Native.share(session);
+            recorder = new Recorder(File.createTempFile("video", ".mp4", folder), width, height, media);
+            screen.recording(true);
+        } catch (Exception refused) { // encoders throw what they like: busy, no such size, no space
+            screen.notRecorded(refused);
+        }
+    }
+
+    private void record() {
+        if (recorder == null) return;
+        try {
+            if (!recorder.frame(width, height)) stopRecording(false);
+        } catch (RuntimeException broken) {
+            stopRecording(false);
+        }
+    }
+
+    private void stopRecording(boolean lost) {
+        if (recorder == null) return;
+        Recorder ended = recorder;
+        recorder = null;
+        screen.recording(false);
+        try {
+            File video = ended.finish(lost);
+            if (video != null) screen.recorded(video);
+        } catch (RuntimeException broken) {
+            screen.notRecorded(broken);
         }
     }
 

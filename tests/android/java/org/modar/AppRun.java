@@ -40,6 +40,7 @@ public final class AppRun {
 
         if (words[7].equals("scene")) {
             scene();
+            videos();
             System.out.println("the day is over");
             return;
         }
@@ -260,6 +261,117 @@ public final class AppRun {
         android.app.AlertDialog.shown.yes.onClick(null, 0);
         check(Context.started.action.equals("android.intent.action.VIEW") && Context.started.data.path.equals("https://museum.org/cover"),
                 "the link");
+        app.onPause();
+        app.onDestroy();
+    }
+
+    private static File[] videoFiles(String folder) {
+        File[] all = new File(Context.folder, folder).listFiles((in, name) -> name.startsWith("video-"));
+        return all == null ? new File[0] : all;
+    }
+
+    /** Packets of a track of what the encoder's file has. */
+    private static java.util.List<Object[]> packets(int track) {
+        java.util.List<Object[]> found = new java.util.ArrayList<>();
+        for (Object[] each : android.media.MediaMuxer.packets) {
+            if ((Integer) each[0] == track) found.add(each);
+        }
+        return found;
+    }
+
+    /** The share of a recorded picture that is not what the screen shows at the same place. */
+    private static double unlike(byte[] recorded, byte[] screen, int width, int height) {
+        int far = 0;
+        for (int y = 0; y < height; y++) {
+            for (int x = 0; x < width; x++) {
+                int to = 4 * (y * width + x), from = 4 * (y * Camera.height / height * Camera.width + x * Camera.width / width);
+                int off = 0;
+                for (int k = 0; k < 3; k++) off = Math.max(off, Math.abs((recorded[to + k] & 255) - (screen[from + k] & 255)));
+                if (off > 60) far++;
+            }
+        }
+        return (double) far / (width * height);
+    }
+
+    /** What a stopped recording left: a whole file in the gallery, and nothing else anywhere. */
+    private static void whole(String folder, int count) throws Exception {
+        joinAll("modar-video");
+        check(status().equals("Saved to your videos"), "saved");
+        check(((TextView) app.findViewById(R.id.record)).text.equals("Video"), "ready for another");
+        File[] saved = videoFiles(folder);
+        check(saved.length == count, saved.length + " videos");
+        java.util.Arrays.sort(saved);
+        check(new String(Files.readAllBytes(saved[count - 1].toPath())).endsWith("whole\n"), "a whole file");
+        check(android.media.MediaCodec.open == 0 && android.opengl.EGL14.open == 0 && android.media.MediaExtractor.open == 0, "all is given back");
+        for (String each : Context.folder.list()) check(!each.startsWith("video") && !each.startsWith("media1"), "left: " + each);
+    }
+
+    /** Recorded are the screen's pictures and the film's sound, at their times; the file is whole however it ends. */
+    private static void videos() throws Exception {
+        start();
+        for (int i = 0; i < 4; i++) check(deliver(i), "frame " + i);
+        click(R.id.sound);
+        click(R.id.record);
+        byte[][] shown = new byte[8][];
+        for (int i = 0; i < shown.length; i++) {
+            android.os.SystemClock.ahead += 100000000L;
+            android.media.MediaPlayer.pass(100);
+            check(deliver(i), "frame " + i);
+            shown[i] = picture();
+        }
+        Handler.pump();
+        check(((TextView) app.findViewById(R.id.record)).text.equals("Stop"), "a button to stop");
+        click(R.id.record);
+        view.frame();
+        whole("Movies/ModAR", 1);
+        check(android.media.MediaMuxer.tracks.equals(java.util.Arrays.asList("video/avc", "audio/mp4a-latm")), "pictures and sound");
+        java.util.List<Object[]> pictures = packets(0), sounds = packets(1);
+        check(pictures.size() >= shown.length, pictures.size() + " pictures of " + shown.length);
+        int width = (Camera.width + 8) / 16 * 16, height = ((byte[]) pictures.get(0)[2]).length / 4 / width;
+        check(Math.abs(height - Camera.height) <= 8 && height % 16 == 0, "its size: " + width + " x " + height);
+        long time = -1;
+        for (int i = 0; i < shown.length; i++) {
+            Object[] each = pictures.get(pictures.size() - shown.length + i);
+            check((Long) each[1] > time, "times rise");
+            check(i == 0 || (Long) each[1] - time >= 100000 && (Long) each[1] - time < 2000000, "a picture each 0.1 s");
+            time = (Long) each[1];
+            double off = unlike((byte[]) each[2], shown[i], width, height);
+            check(off < 0.03, "picture " + i + " is the screen's: " + off);
+            check(i == 0 || unlike((byte[]) each[2], shown[i - 1], width, height) > off, "and not the one before");
+        }
+        // 800 ms of packets of 23 ms, one after the other, from where the film was.
+        int first = ByteBuffer.wrap((byte[]) sounds.get(0)[2]).getInt();
+        check(sounds.size() > 10 && first < 10, sounds.size() + " packets from " + first);
+        for (int i = 1; i < sounds.size(); i++) check((Long) sounds.get(i)[1] > (Long) sounds.get(i - 1)[1], "sounds rise");
+        click(R.id.share);
+        check(Context.started.of.type.equals("video/mp4") && ((android.net.Uri) Context.started.of.stream).path.contains("/video-"), "shared");
+        // Without sound, by Android 10, until it is long enough.
+        android.os.Build.VERSION.SDK_INT = 29;
+        click(R.id.sound);
+        click(R.id.record);
+        check(deliver(0), "a frame");
+        android.os.SystemClock.ahead += 31000000000L;
+        check(deliver(1), "half a minute later");
+        whole("gallery", 1);
+        check(android.media.MediaMuxer.tracks.size() == 1, "silent");
+        // A call.
+        click(R.id.record);
+        check(deliver(0) && deliver(1), "frames");
+        app.onPause();
+        app.onResume();
+        check(deliver(0), "goes on");
+        whole("gallery", 2);
+        // The context goes with all that is in it.
+        click(R.id.record);
+        check(deliver(0) && deliver(1), "frames");
+        view.surface(Camera.width, Camera.height, true);
+        android.opengl.EGL14.open = 0;
+        check(deliver(0), "goes on");
+        whole("gallery", 3);
+        android.media.MediaCodec.busy = true;
+        click(R.id.record);
+        check(deliver(0), "goes on");
+        check(status().equals("No video: no encoder is free") && android.media.MediaCodec.open == 0, "no encoder: " + status());
         app.onPause();
         app.onDestroy();
     }
