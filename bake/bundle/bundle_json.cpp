@@ -1,8 +1,8 @@
 // The bundle's meta text, written and read, and what `modar inspect` and `modar bake` print of a
 // bundle.
 #include "bake/bundle/bundle_json.hpp"
-#include "bake/bundle/scene_nodes.hpp"
-#include "bake/bundle/scene_placement.hpp"
+#include "bake/bundle/scene/scene_nodes.hpp"
+#include "bake/bundle/scene/scene_placement.hpp"
 
 #include <algorithm>
 #include <cstdio>

@@ -4,8 +4,8 @@
 #include <cstring>
 
 #include "bake/bundle/bundle_json.hpp"
-#include "bake/bundle/scene_nodes.hpp"
-#include "bake/bundle/scene_placement.hpp"
+#include "bake/bundle/scene/scene_nodes.hpp"
+#include "bake/bundle/scene/scene_placement.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/content_summary.hpp"
 #include "formats/draw_order.hpp"

@@ -10,7 +10,7 @@
 #include <set>
 
 #include "bake/bundle/light_image.hpp"
-#include "bake/bundle/scene_nodes.hpp"
+#include "bake/bundle/scene/scene_nodes.hpp"
 #include "bake/import/read_model.hpp"
 #include "formats/base/nearest.hpp"
 #include "formats/base/path.hpp"

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <iterator>
 
-#include "bake/check/device_rules.hpp"
+#include "bake/check/device/device_rules.hpp"
 #include "bake/check/yml_rule.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"

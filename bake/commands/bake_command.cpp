@@ -11,15 +11,15 @@
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/bundle/bundle_json.hpp"
-#include "bake/check/reproduce.hpp"
+#include "bake/check/source/reproduce.hpp"
 #include "bake/commands/bake_options.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/commands/project_command.hpp"
 #include "bake/image/image.hpp"
+#include "bake/io/output.hpp"
+#include "bake/io/terminal.hpp"
 #include "bake/memory/memory_limit.hpp"
 #include "bake/options/request_text.hpp"
-#include "bake/output.hpp"
-#include "bake/terminal.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
 

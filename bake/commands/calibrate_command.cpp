@@ -4,10 +4,10 @@
 #include <memory>
 
 #include "bake/commands/commands.hpp"
+#include "bake/io/output.hpp"
+#include "bake/io/terminal.hpp"
 #include "bake/json.hpp"
-#include "bake/output.hpp"
 #include "bake/pattern/pattern.hpp"
-#include "bake/terminal.hpp"
 
 namespace modar {
 namespace {

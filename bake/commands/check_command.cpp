@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <string>
 
-#include "bake/check/device_file.hpp"
+#include "bake/check/device/device_file.hpp"
 #include "bake/check/verdict.hpp"
-#include "bake/terminal.hpp"
+#include "bake/io/terminal.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/device_profile.hpp"
 #include "modar/mapped_file.hpp"

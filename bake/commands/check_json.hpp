@@ -4,10 +4,10 @@
 #include <optional>
 #include <string>
 
-#include "bake/check/pose_check.hpp"
-#include "bake/check/source_check.hpp"
+#include "bake/check/picture/pose_check.hpp"
+#include "bake/check/picture/visual_check.hpp"
+#include "bake/check/source/source_check.hpp"
 #include "bake/check/verdict.hpp"
-#include "bake/check/visual_check.hpp"
 
 namespace modar {
 

@@ -8,10 +8,10 @@
 #include "bake/check/text_check.hpp"
 #include "bake/commands/check_command.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/io/output.hpp"
+#include "bake/io/terminal.hpp"
 #include "bake/options/request_text.hpp"
-#include "bake/output.hpp"
 #include "bake/project/project.hpp"
-#include "bake/terminal.hpp"
 
 namespace modar {
 namespace {

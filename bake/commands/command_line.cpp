@@ -9,7 +9,7 @@
 #include <set>
 #include <type_traits>
 
-#include "bake/terminal.hpp"
+#include "bake/io/terminal.hpp"
 #include "formats/base/nearest.hpp"
 
 namespace modar {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "bake/commands/commands.hpp"
-#include "bake/output.hpp"
+#include "bake/io/output.hpp"
 #include "formats/base/atomic_file.hpp"
 
 namespace modar {

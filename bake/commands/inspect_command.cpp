@@ -6,7 +6,7 @@
 #include "bake/bundle/bundle_json.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/export/extract.hpp"
-#include "bake/terminal.hpp"
+#include "bake/io/terminal.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
 

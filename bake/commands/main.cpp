@@ -2,7 +2,7 @@
 #include <string>
 
 #include "bake/commands/commands.hpp"
-#include "bake/terminal.hpp"
+#include "bake/io/terminal.hpp"
 
 int main(int argc, char** argv) {
   const int code = modar::guarded([&] {

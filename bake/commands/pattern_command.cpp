@@ -9,11 +9,11 @@
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/commands/commands.hpp"
+#include "bake/io/output.hpp"
+#include "bake/io/terminal.hpp"
 #include "bake/json.hpp"
 #include "bake/options/request_text.hpp"
-#include "bake/output.hpp"
 #include "bake/pattern/pattern.hpp"
-#include "bake/terminal.hpp"
 #include "formats/base/path.hpp"
 #include "modar/camera_file.hpp"
 

@@ -6,9 +6,9 @@
 #include <thread>
 
 #include "bake/commands/commands.hpp"
-#include "bake/output.hpp"
+#include "bake/io/output.hpp"
+#include "bake/io/terminal.hpp"
 #include "bake/page/report_page.hpp"
-#include "bake/terminal.hpp"
 #include "formats/base/atomic_file.hpp"
 #include "modar/mapped_file.hpp"
 

@@ -5,7 +5,7 @@
 
 #include "bake/commands/commands.hpp"
 #include "bake/commands/ship_command.hpp"
-#include "bake/terminal.hpp"
+#include "bake/io/terminal.hpp"
 #include "modar/device_profile.hpp"
 
 namespace modar {

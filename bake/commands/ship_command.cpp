@@ -14,11 +14,11 @@
 #include <optional>
 
 #include "bake/commands/ship_json.hpp"
-#include "bake/output.hpp"
-#include "bake/ship/keys.hpp"
+#include "bake/io/output.hpp"
+#include "bake/io/terminal.hpp"
+#include "bake/ship/keys/keys.hpp"
+#include "bake/ship/keys/root_draft.hpp"
 #include "bake/ship/release_folder.hpp"
-#include "bake/ship/root_draft.hpp"
-#include "bake/terminal.hpp"
 #include "bake/web/http_reader.hpp"
 #include "formats/base/atomic_file.hpp"
 #include "modar/device_profile.hpp"

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "bake/commands/commands.hpp"
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "bake/project/project.hpp"
 #include "bake/studio/studio.hpp"
 

@@ -3,9 +3,9 @@
 #include <memory>
 
 #include "bake/commands/commands.hpp"
+#include "bake/io/terminal.hpp"
 #include "bake/json.hpp"
 #include "bake/ship/verify_release.hpp"
-#include "bake/terminal.hpp"
 #include "bake/web/http_reader.hpp"
 #include "bake/web/serve.hpp"
 #include "bake/web/site.hpp"

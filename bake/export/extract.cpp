@@ -6,11 +6,10 @@
 #include <string_view>
 #include <system_error>
 
-#include "bake/export/glb_writer.hpp"
+#include "bake/export/model_file.hpp"
 #include "bake/export/room_models.hpp"
 #include "bake/export/texture_files.hpp"
-#include "bake/export/usdz_writer.hpp"
-#include "bake/output.hpp"
+#include "bake/io/output.hpp"
 #include "bake/texture/texture_codec.hpp"
 #include "formats/base/atomic_file.hpp"
 

@@ -1,5 +1,5 @@
 // Decodes a model's packed bytes and writes them through tinygltf.
-#include "bake/export/glb_writer.hpp"
+#include "bake/export/model_file.hpp"
 
 #include <algorithm>
 #include <cmath>

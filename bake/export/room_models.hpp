@@ -6,7 +6,7 @@
 
 #include <glm/mat4x4.hpp>
 
-#include "bake/export/glb_writer.hpp"
+#include "bake/export/model_file.hpp"
 #include "formats/bundle_view.hpp"
 
 namespace modar {

@@ -1,5 +1,5 @@
 // Writes the description by hand: a subset of USD that needs none of its libraries.
-#include "bake/export/usdz_writer.hpp"
+#include "bake/export/model_file.hpp"
 
 #include <zlib.h>
 

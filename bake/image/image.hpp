@@ -63,7 +63,4 @@ Result<std::vector<std::byte>> encode_jpeg(const RgbaImage& image, int quality);
 /// a texture that repeats does.
 std::vector<RgbaImage> mip_chain(const RgbaImage& image, bool repeat = false, unsigned jobs = 1);
 
-/// Mean over R, G, B; 99 where the images are equal.
-double psnr_db(const RgbaImage& a, const RgbaImage& b);
-
 }  // namespace modar

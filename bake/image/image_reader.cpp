@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "bake/image/decoders.hpp"
-#include "bake/input.hpp"
+#include "bake/io/input.hpp"
 
 namespace modar {
 namespace {

@@ -8,7 +8,7 @@
 #include <png.h>
 
 #include "bake/image/decoders.hpp"
-#include "bake/input.hpp"
+#include "bake/io/input.hpp"
 #include "formats/base/atomic_file.hpp"
 
 namespace modar {

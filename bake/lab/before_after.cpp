@@ -5,13 +5,13 @@
 #include <memory>
 
 #include "bake/bundle/bundle_builder.hpp"
-#include "bake/check/reference_renderer.hpp"
-#include "bake/check/visual_check.hpp"
+#include "bake/check/picture/reference_renderer.hpp"
+#include "bake/check/picture/visual_check.hpp"
 #include "bake/image/image.hpp"
 #include "bake/lab/bench_parts.hpp"
 #include "bake/lab/light_bench.hpp"
 #include "bake/lab/render_bench.hpp"
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "formats/base/path.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/mapped_file.hpp"

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "bake/bundle/bundle_builder.hpp"
+#include "bake/io/terminal.hpp"
 #include "bake/lab/bench_parts.hpp"
 #include "bake/lab/etc1_bench.hpp"
 #include "bake/lab/extended_bench.hpp"
@@ -17,7 +18,6 @@
 #include "bake/lab/render_bench.hpp"
 #include "bake/lab/ship_bench.hpp"
 #include "bake/lab/wild_bench.hpp"
-#include "bake/terminal.hpp"
 #include "formats/base/path.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"

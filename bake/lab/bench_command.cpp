@@ -4,10 +4,10 @@
 #include <memory>
 #include <thread>
 
+#include "bake/io/terminal.hpp"
 #include "bake/json.hpp"
 #include "bake/lab/bench.hpp"
 #include "bake/lab/commands.hpp"
-#include "bake/terminal.hpp"
 
 namespace modar {
 namespace {

@@ -12,7 +12,7 @@
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/lab/bench_parts.hpp"
 #include "bake/lab/heap.hpp"
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/pose_loop.hpp"

@@ -11,7 +11,7 @@
 #include "bake/json.hpp"
 #include "bake/lab/bench_parts.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 
 namespace modar {
 namespace {

@@ -5,13 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "bake/io/terminal.hpp"
 #include "bake/lab/bench_parts.hpp"
 #include "bake/lab/lookalike_bench.hpp"
 #include "bake/lab/many_bench.hpp"
 #include "bake/lab/pose_bench.hpp"
 #include "bake/lab/score_bench.hpp"
 #include "bake/lab/shape_bench.hpp"
-#include "bake/terminal.hpp"
 #include "modar/features.hpp"
 
 namespace modar {

@@ -9,7 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "bake/lab/bench_parts.hpp"
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "modar/features.hpp"
 
 namespace modar {

@@ -8,7 +8,7 @@
 
 #include "bake/lab/ship_bench.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
-#include "bake/thread_clock.hpp"
+#include "bake/process/thread_clock.hpp"
 
 namespace modar {
 namespace {

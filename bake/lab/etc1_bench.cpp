@@ -1,12 +1,13 @@
 // Measures the encoder that bakes: the same function, one thread, processor time.
 #include "bake/lab/etc1_bench.hpp"
+#include "bake/image/difference.hpp"
 
 #include <algorithm>
 #include <utility>
 
 #include "bake/lab/etc1_reference.hpp"
+#include "bake/process/thread_clock.hpp"
 #include "bake/texture/etc1/etc1_encoder.hpp"
-#include "bake/thread_clock.hpp"
 
 namespace modar {
 namespace {

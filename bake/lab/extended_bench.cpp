@@ -12,7 +12,7 @@
 #include <glm/matrix.hpp>
 
 #include "bake/lab/room_scene.hpp"
-#include "bake/thread_clock.hpp"
+#include "bake/process/thread_clock.hpp"
 #include "bake/video/video.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/pose_loop.hpp"

@@ -13,14 +13,14 @@
 #include <glm/matrix.hpp>
 
 #include "bake/bundle/bundle_builder.hpp"
-#include "bake/check/reference_renderer.hpp"
-#include "bake/check/visual_check.hpp"
+#include "bake/check/picture/reference_renderer.hpp"
+#include "bake/check/picture/visual_check.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/lab/bench_parts.hpp"
 #include "bake/lab/path_tracer.hpp"
 #include "bake/lab/render_bench.hpp"
 #include "bake/mesh/weld/weld.hpp"
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "formats/base/path.hpp"
 #include "formats/bundle_writer.hpp"
 #include "modar/gl_context.hpp"

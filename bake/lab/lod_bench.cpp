@@ -15,9 +15,9 @@
 
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
-#include "bake/mesh/triangle_tree.hpp"
+#include "bake/mesh/rays/triangle_tree.hpp"
 #include "bake/mesh/weld/weld.hpp"
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
 

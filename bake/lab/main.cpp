@@ -1,8 +1,8 @@
 // The program `modar-lab`: what measures ModAR, apart from what people use.
 #include <string>
 
+#include "bake/io/terminal.hpp"
 #include "bake/lab/commands.hpp"
-#include "bake/terminal.hpp"
 
 int main(int argc, char** argv) {
   const int code = modar::guarded([&] {

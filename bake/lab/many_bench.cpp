@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "bake/lab/heap.hpp"
-#include "bake/thread_clock.hpp"
+#include "bake/process/thread_clock.hpp"
 #include "formats/base/parallel.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/pose_loop.hpp"

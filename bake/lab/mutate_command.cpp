@@ -3,10 +3,10 @@
 #include <memory>
 #include <string>
 
+#include "bake/io/terminal.hpp"
 #include "bake/json.hpp"
 #include "bake/lab/commands.hpp"
 #include "bake/lab/mutate.hpp"
-#include "bake/terminal.hpp"
 #include "modar/mapped_file.hpp"
 
 namespace modar {

@@ -12,7 +12,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "bake/mesh/triangle_tree.hpp"
+#include "bake/mesh/rays/triangle_tree.hpp"
 #include "formats/base/colour.hpp"
 #include "formats/base/parallel.hpp"
 

@@ -9,7 +9,7 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 
-#include "bake/check/reference_renderer.hpp"
+#include "bake/check/picture/reference_renderer.hpp"
 #include "bake/image/image.hpp"
 #include "bake/image/resample.hpp"
 #include "bake/mesh/tri_mesh.hpp"

@@ -15,7 +15,7 @@
 #include "bake/lab/field_scene.hpp"
 #include "bake/lab/number_lines.hpp"
 #include "bake/lab/unknown_view.hpp"
-#include "bake/thread_clock.hpp"
+#include "bake/process/thread_clock.hpp"
 #include "bake/video/video.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/features.hpp"

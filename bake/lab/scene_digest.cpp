@@ -4,7 +4,7 @@
 #include <fstream>
 #include <string_view>
 
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "formats/base/atomic_file.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/colour_grid.hpp"

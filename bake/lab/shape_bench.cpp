@@ -8,7 +8,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "bake/thread_clock.hpp"
+#include "bake/process/thread_clock.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/pose_loop.hpp"
 

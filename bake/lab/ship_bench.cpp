@@ -7,9 +7,9 @@
 #include <meshoptimizer.h>
 #include <zstd.h>
 
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
+#include "bake/process/thread_clock.hpp"
 #include "bake/ship/recipe_maker.hpp"
-#include "bake/thread_clock.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/piece.hpp"
 

@@ -12,7 +12,7 @@
 #include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/pattern/pattern.hpp"
-#include "bake/texture/atlas.hpp"
+#include "bake/texture/atlas/atlas.hpp"
 #include "bake/texture/texture.hpp"
 #include "bake/up_axis.hpp"
 #include "formats/base/error.hpp"

@@ -3,8 +3,8 @@
 #include <cstdio>
 
 #include "bake/bundle/bundle_json.hpp"
+#include "bake/io/terminal.hpp"
 #include "bake/json.hpp"
-#include "bake/terminal.hpp"
 #include "formats/base/html.hpp"
 #include "formats/captions.hpp"
 #include "formats/meta_text.hpp"

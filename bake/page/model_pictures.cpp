@@ -13,7 +13,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "bake/bundle/bundle_json.hpp"
-#include "bake/bundle/scene_placement.hpp"
+#include "bake/bundle/scene/scene_placement.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/camera.hpp"

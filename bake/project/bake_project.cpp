@@ -13,15 +13,15 @@
 #include <optional>
 #include <set>
 
-#include "bake/bundle/alike_patterns.hpp"
 #include "bake/bundle/link_bundles.hpp"
+#include "bake/io/terminal.hpp"
 #include "bake/json.hpp"
+#include "bake/pattern/alike_patterns.hpp"
 #include "bake/project/file_digests.hpp"
 #include "bake/project/interrupts.hpp"
 #include "bake/project/part_cache.hpp"
 #include "bake/project/project.hpp"
 #include "bake/project/settings.hpp"
-#include "bake/terminal.hpp"
 #include "bake/video/encode_video.hpp"
 #include "formats/base/atomic_file.hpp"
 #include "formats/base/parallel.hpp"

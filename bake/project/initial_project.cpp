@@ -8,11 +8,11 @@
 
 #include "bake/image/image.hpp"
 #include "bake/import/read_model.hpp"
-#include "bake/input.hpp"
+#include "bake/io/input.hpp"
 #include "bake/mesh/upright.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/options/options.hpp"
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "bake/project/project.hpp"
 
 namespace modar {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "bake/report.hpp"
-#include "bake/ship/keys.hpp"
+#include "bake/ship/keys/keys.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/bundle_writer.hpp"
 #include "modar/mapped_file.hpp"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bake/report.hpp"
-#include "bake/ship/keys.hpp"
+#include "bake/ship/keys/keys.hpp"
 #include "bake/ship/recipe_maker.hpp"
 #include "modar/release.hpp"
 

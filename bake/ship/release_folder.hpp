@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-#include "bake/ship/keys.hpp"
+#include "bake/ship/keys/keys.hpp"
 #include "bake/ship/object_ledger.hpp"
 #include "bake/ship/recipe_maker.hpp"
 #include "formats/base/folder_lock.hpp"

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "bake/output.hpp"
+#include "bake/io/output.hpp"
 #include "formats/base/utf8.hpp"
 
 namespace modar {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "bake/bundle/bundle_json.hpp"
-#include "bake/check/device_rules.hpp"
+#include "bake/check/device/device_rules.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/studio/make.hpp"
 #include "bake/studio/session.hpp"

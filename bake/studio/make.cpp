@@ -4,7 +4,7 @@
 #include <chrono>
 #include <filesystem>
 
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "bake/studio/archive.hpp"
 #include "bake/studio/inside.hpp"
 #include "bake/studio/phone.hpp"

@@ -13,8 +13,8 @@
 #include <fstream>
 #include <thread>
 
-#include "bake/output.hpp"
-#include "bake/process.hpp"
+#include "bake/io/output.hpp"
+#include "bake/process/process.hpp"
 #include "bake/studio/server.hpp"
 #include "bake/studio/session.hpp"
 #include "bake/studio/watcher.hpp"

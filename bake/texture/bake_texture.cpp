@@ -4,10 +4,10 @@
 #include <charconv>
 #include <cmath>
 
+#include "bake/image/difference.hpp"
 #include "bake/image/resample.hpp"
 #include "bake/texture/coverage.hpp"
 #include "bake/texture/texture.hpp"
-#include "bake/texture/texture_quality.hpp"
 #include "formats/base/path.hpp"
 #include "formats/layout.hpp"
 

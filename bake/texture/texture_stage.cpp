@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "bake/mesh/repeating.hpp"
+#include "bake/mesh/tri_mesh.hpp"
 #include "formats/layout.hpp"
 #include "formats/texture_format.hpp"
 

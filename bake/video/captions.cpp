@@ -1,6 +1,6 @@
 #include "formats/captions.hpp"
-#include "bake/input.hpp"
-#include "bake/process.hpp"
+#include "bake/io/input.hpp"
+#include "bake/process/process.hpp"
 #include "bake/video/encode_video.hpp"
 
 namespace modar {

@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "modar/mapped_file.hpp"
 
 namespace modar {

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <vector>
 
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "bake/video/encode_video.hpp"
 #include "formats/base/colour.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <dlfcn.h>
 
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "bake/video/video_library.hpp"
 
 namespace modar {

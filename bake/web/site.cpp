@@ -7,12 +7,11 @@
 #include <span>
 #include <string_view>
 
-#include "bake/export/glb_writer.hpp"
+#include "bake/export/model_file.hpp"
 #include "bake/export/room_models.hpp"
-#include "bake/export/usdz_writer.hpp"
+#include "bake/io/output.hpp"
 #include "bake/json.hpp"
-#include "bake/output.hpp"
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "bake/web/hint.hpp"
 #include "bake/web/packed_bundle.hpp"
 #include "bake/web/page_texts.hpp"

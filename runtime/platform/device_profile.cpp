@@ -1,7 +1,7 @@
 // The table of device profiles and its look-up.
 #include "modar/device_profile.hpp"
 
-#include "runtime/platform/extension_list.hpp"
+#include "runtime/platform/gl/extension_list.hpp"
 
 namespace modar {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <EGL/egl.h>
 
-#include "runtime/platform/extension_list.hpp"
+#include "runtime/platform/gl/extension_list.hpp"
 
 namespace modar {
 namespace {

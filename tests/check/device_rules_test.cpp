@@ -1,5 +1,5 @@
 // Rules on devices, against devices that are made for one breach each.
-#include "bake/check/device_rules.hpp"
+#include "bake/check/device/device_rules.hpp"
 
 #include <gtest/gtest.h>
 

@@ -10,7 +10,7 @@
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/bundle/light_image.hpp"
-#include "bake/bundle/scene_shadow.hpp"
+#include "bake/bundle/scene/scene_shadow.hpp"
 #include "formats/base/atomic_file.hpp"
 #include "modar/renderer.hpp"
 

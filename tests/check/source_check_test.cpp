@@ -1,6 +1,6 @@
 // A bundle beside its own source: a good one differs in nothing, and each thing that the device
 // uses is noticed where it is changed behind right hashes.
-#include "bake/check/source_check.hpp"
+#include "bake/check/source/source_check.hpp"
 
 #include <gtest/gtest.h>
 

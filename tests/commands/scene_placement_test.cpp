@@ -1,6 +1,6 @@
 // Where models stand: GLM turns the axes, a box with known sides or its eight corners tell where
 // the base must be.
-#include "bake/bundle/scene_placement.hpp"
+#include "bake/bundle/scene/scene_placement.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Sizes as people read them.
-#include "bake/terminal.hpp"
+#include "bake/io/terminal.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "bake/check/device_file.hpp"
+#include "bake/check/device/device_file.hpp"
 #include "tests/fuzz/need.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "bake/ship/keys.hpp"
+#include "bake/ship/keys/keys.hpp"
 #include "tests/fuzz/need.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "bake/check/source_check.hpp"
+#include "bake/check/source/source_check.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
 #include "formats/captions.hpp"
 

@@ -11,7 +11,7 @@
 #include <system_error>
 #include <vector>
 
-#include "bake/ship/keys.hpp"
+#include "bake/ship/keys/keys.hpp"
 #include "modar/fetch.hpp"
 #include "tests/fuzz/input_file.hpp"
 #include "tests/fuzz/need.hpp"

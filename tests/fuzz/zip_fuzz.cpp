@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "bake/studio/archive.hpp"
 #include "tests/fuzz/input_file.hpp"
 #include "tests/fuzz/need.hpp"

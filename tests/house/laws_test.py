@@ -100,9 +100,10 @@ class PlantedViolations(unittest.TestCase):
                 ("runtime/render/b.cpp", "runtime/fetch/store.hpp", "no door of runtime/fetch"),
                 ("runtime/play/a.cpp", "runtime/render/program.hpp", "no door of runtime/render"),
                 ("bake/mesh/a.cpp", "bake/import/obj/number_parser.hpp", "read_model.hpp"),
-                ("bake/texture/a.cpp", "bake/mesh/lod/level_map.hpp", "weld/weld.hpp"),
+                ("bake/texture/a.cpp", "bake/mesh/lod/level_map.hpp", "mesh_levels.hpp"),
+                ("bake/mesh/b.cpp", "bake/mesh/lod/level_map.hpp", "no door of bake/mesh/lod"),
                 ("bake/bundle/a.cpp", "bake/texture/etc1/etc1_encoder.hpp", "texture_codec.hpp"),
-                ("bake/check/a.cpp", "bake/bundle/scene_shadow.hpp", "bundle_builder.hpp"),
+                ("bake/check/a.cpp", "bake/bundle/request_check.hpp", "bundle_builder.hpp"),
                 ("bake/commands/a.cpp", "bake/ship/recipe_maker.hpp", "publish.hpp"),
                 ("bake/commands/b.cpp", "bake/pattern/trial.hpp", "pattern.hpp"),
                 ("runtime/attic/a.cpp", "runtime/cellar/a.hpp", "is no room of DOORS")):

@@ -1,5 +1,5 @@
 // Shapes whose occlusion is known without casting a ray.
-#include "bake/mesh/occlusion.hpp"
+#include "bake/mesh/rays/occlusion.hpp"
 
 #include <cmath>
 

@@ -12,7 +12,7 @@
 #include <glm/common.hpp>
 
 #include "bake/mesh/lod/reduce.hpp"
-#include "bake/mesh/triangle_tree.hpp"
+#include "bake/mesh/rays/triangle_tree.hpp"
 #include "tests/mesh/stages.hpp"
 
 namespace modar {

@@ -1,5 +1,5 @@
 // The tree finds what trying every triangle finds; nearest points are nearest by a fine raster.
-#include "bake/mesh/triangle_tree.hpp"
+#include "bake/mesh/rays/triangle_tree.hpp"
 
 #include <gtest/gtest.h>
 

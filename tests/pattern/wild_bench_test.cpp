@@ -10,7 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 
-#include "bake/process.hpp"
+#include "bake/process/process.hpp"
 #include "tests/track/synthetic.hpp"
 
 namespace modar {

@@ -7,7 +7,7 @@
 #include <random>
 #include <string>
 
-#include "bake/ship/keys.hpp"
+#include "bake/ship/keys/keys.hpp"
 #include "bake/ship/recipe_maker.hpp"
 #include "modar/piece.hpp"
 #include "modar/release.hpp"

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "bake/ship/keys.hpp"
+#include "bake/ship/keys/keys.hpp"
 
 namespace modar {
 namespace {

@@ -16,8 +16,8 @@
 
 #include "../mesh/stages.hpp"
 #include "bake/image/image.hpp"
-#include "bake/texture/atlas.hpp"
-#include "bake/texture/atlas_layout.hpp"
+#include "bake/texture/atlas/atlas.hpp"
+#include "bake/texture/atlas/atlas_layout.hpp"
 #include "texture_samples.hpp"
 
 namespace modar {

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "bake/texture/texture_quality.hpp"
+#include "bake/image/difference.hpp"
 #include "tests/texture/texture_samples.hpp"
 
 namespace modar {

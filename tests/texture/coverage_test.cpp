@@ -7,8 +7,8 @@
 #include <random>
 #include <set>
 
+#include "bake/image/difference.hpp"
 #include "bake/lab/etc1_bench.hpp"
-#include "bake/texture/texture_quality.hpp"
 #include "bake/texture/texture_stage.hpp"
 #include "tests/texture/texture_samples.hpp"
 

@@ -4,9 +4,9 @@
 #include <array>
 #include <random>
 
+#include "bake/image/difference.hpp"
 #include "bake/texture/etc1/etc1_encoder.hpp"
 #include "bake/texture/etc1/etc1_kernel.hpp"
-#include "bake/texture/texture_quality.hpp"
 #include "tests/texture/etc1_block.hpp"
 #include "tests/texture/libetc1.hpp"
 #include "tests/texture/texture_samples.hpp"

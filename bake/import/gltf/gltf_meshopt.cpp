@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "bake/import/gltf/gltf_materials.hpp"
-#include "bake/input.hpp"
+#include "bake/io/input.hpp"
 #include "bake/json.hpp"
 
 namespace modar {

@@ -21,7 +21,7 @@
 #include "bake/import/gltf/gltf_pose.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
 #include "bake/import/read_model.hpp"
-#include "bake/input.hpp"
+#include "bake/io/input.hpp"
 
 namespace modar {
 namespace {

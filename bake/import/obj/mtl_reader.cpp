@@ -15,7 +15,7 @@
 #include "bake/import/obj/number_parser.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/import/reflection.hpp"
-#include "bake/input.hpp"
+#include "bake/io/input.hpp"
 #include "formats/base/colour.hpp"
 
 namespace modar {

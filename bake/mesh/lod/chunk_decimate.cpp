@@ -15,7 +15,7 @@
 
 #include "bake/import/source_model.hpp"
 #include "bake/mesh/lod/quadric.hpp"
-#include "bake/mesh/triangle_tree.hpp"
+#include "bake/mesh/rays/triangle_tree.hpp"
 
 namespace modar {
 namespace {

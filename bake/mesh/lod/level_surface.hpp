@@ -11,7 +11,7 @@
 #include <glm/vec3.hpp>
 
 #include "bake/import/source_model.hpp"
-#include "bake/mesh/triangle_tree.hpp"
+#include "bake/mesh/rays/triangle_tree.hpp"
 
 namespace modar {
 

@@ -11,7 +11,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "bake/mesh/triangle_tree.hpp"
+#include "bake/mesh/rays/triangle_tree.hpp"
 
 namespace modar {
 namespace {

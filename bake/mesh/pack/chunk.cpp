@@ -12,7 +12,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "bake/mesh/repeating.hpp"
+#include "bake/mesh/tri_mesh.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {

@@ -1,0 +1,208 @@
+#include "bake/bundle/scene/scene_placement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include <glm/common.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/trigonometric.hpp>
+
+#include "bake/mesh/pack/vertex_codec.hpp"
+
+namespace modar {
+namespace {
+
+/// Takes the axis to +z.
+glm::dquat turn_to_z(UpAxis up) {
+  const double h = std::sqrt(0.5);
+  switch (up) {
+    case UpAxis::kX:
+      return {h, 0, -h, 0};
+    case UpAxis::kMinusX:
+      return {h, 0, h, 0};
+    case UpAxis::kY:
+      return {h, h, 0, 0};
+    case UpAxis::kMinusY:
+      return {h, -h, 0, 0};
+    case UpAxis::kMinusZ:
+      return {0, 1, 0, 0};
+    case UpAxis::kZ:
+      break;
+  }
+  return {1, 0, 0, 0};
+}
+
+}  // namespace
+
+glm::dquat rotation_of(UpAxis up, const std::array<double, 3>& turn) {
+  glm::dquat rotation = turn_to_z(up);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double degrees = turn[static_cast<std::size_t>(axis)];
+    if (degrees == 0) continue;
+    glm::dvec3 about(0.0);
+    about[axis] = 1;
+    rotation = glm::angleAxis(glm::radians(degrees), about) * rotation;
+  }
+  return rotation;
+}
+
+namespace {
+
+/// Of a model after its rotation, in the unit of [-1,1].
+struct TurnedBox {
+  glm::dvec3 least{1e9};
+  glm::dvec3 greatest{-1e9};
+
+  void add(const glm::dvec3& point) {
+    least = glm::min(least, point);
+    greatest = glm::max(greatest, point);
+  }
+};
+
+/// Does each axis become an axis? Then the box of the source, which is exact, stays a box.
+bool keeps_boxes(const glm::dmat3& turn) {
+  constexpr double kRounding = 1e-9;
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const double size = std::fabs(turn[i][k]);
+      if (size > kRounding && size < 1 - kRounding) return false;
+    }
+  }
+  return true;
+}
+
+/// Of the vertices of a model's finest level. Chunks, Levels: of a bundle that is written or read.
+template <class Chunks, class Levels>
+TurnedBox box_of_vertices(const ModelRecord& model, const LayoutRecord& layout,
+                          const Chunks& chunks, const Levels& levels,
+                          std::span<const std::byte> bytes, const glm::dmat3& turn) {
+  TurnedBox box;
+  const VertexDecoder decoder(layout);
+  for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+    const ChunkRecord& chunk = chunks[model.first_chunk + c];
+    const LevelRecord& level = levels[chunk.first_level];
+    for (std::uint32_t v = 0; v < level.vertex_count; ++v) {
+      const std::byte* vertex =
+          bytes.data() + level.vertex_offset + std::size_t{v} * decoder.stride();
+      box.add(turn * decoder.position(vertex, chunk));
+    }
+  }
+  return box;
+}
+
+TurnedBox turned_box(const BundleContent& content, const PlacedModel& model,
+                     const glm::dmat3& turn) {
+  const double largest = *std::max_element(model.sides.begin(), model.sides.end());
+  TurnedBox box;
+  if (!(largest > 0)) {
+    box.add(glm::dvec3(0.0));
+  } else if (keeps_boxes(turn)) {
+    const glm::dvec3 half(model.sides[0] / largest, model.sides[1] / largest,
+                          model.sides[2] / largest);
+    glm::dvec3 turned(0.0);
+    for (int from = 0; from < 3; ++from) {
+      for (int to = 0; to < 3; ++to)
+        turned[to] += std::round(std::fabs(turn[from][to])) * half[from];
+    }
+    box.add(-turned);
+    box.add(turned);
+  } else {
+    const ModelRecord& record = content.models[model.index];
+    box = box_of_vertices(record, content.layouts[record.layout], content.chunks, content.levels,
+                          content.vertices, turn);
+  }
+  return box;
+}
+
+/// Millimetres in a unit of the pattern's plane (half of its largest side); 0: unknown.
+double millimetres_in_unit(const PatternRecord& pattern) {
+  const double width = 2 * static_cast<double>(pattern.half_width);
+  return width > 0 ? pattern.width_mm / width : 0;
+}
+
+tl::unexpected<Error> scene_error(const char* code, const SceneRequest& request,
+                                  const std::string& cause, const std::string& cure) {
+  return fail(ExitCode::kUsage, code, "scene " + request.pattern + "=" + request.model, cause,
+              cure);
+}
+
+}  // namespace
+
+bool needs_width(const SceneRequest& request) {
+  return request.size.kind != SceneSize::Kind::kScale ||
+         request.offset.unit == SceneOffset::Unit::kMillimetres;
+}
+
+tl::unexpected<Error> no_width(const SceneRequest& request) {
+  return scene_error(
+      "scene.no-width", request,
+      "it gives a length, but the printed width of '" + request.pattern + "' is unknown",
+      "give the width with the picture, as in --pattern FILE:210mm, or use scale=");
+}
+
+Result<SceneRequest> resolve_scene(const SceneRequest& request, const BundleContent& content,
+                                   std::uint32_t pattern, const PlacedModel& model) {
+  SceneRequest resolved = request;
+  resolved.up = request.up.value_or(model.up);
+  const double unit_mm = millimetres_in_unit(content.patterns[pattern]);
+  if (needs_width(request) && !(unit_mm > 0)) {
+    return no_width(request);
+  }
+  if (request.size.kind != SceneSize::Kind::kScale) {
+    const glm::dmat3 turn = glm::mat3_cast(rotation_of(*resolved.up, request.turn));
+    const TurnedBox box = turned_box(content, model, turn);
+    const bool height = request.size.kind == SceneSize::Kind::kHeight;
+    const double extent = height ? box.greatest.z - box.least.z : box.greatest.x - box.least.x;
+    if (!(extent > 0)) {
+      return scene_error(
+          "scene.flat", request,
+          std::string("the model has no ") + (height ? "height" : "width") + " as it stands",
+          "use scale=, or another up=");
+    }
+    resolved.size = {SceneSize::Kind::kScale, request.size.value / unit_mm / extent};
+  }
+  const bool in_mm = request.offset.unit == SceneOffset::Unit::kMillimetres ||
+                     (request.offset.unit == SceneOffset::Unit::kUsual && unit_mm > 0);
+  resolved.offset.unit = SceneOffset::Unit::kSide;
+  // A side is two units of the plane.
+  if (in_mm) {
+    for (double& value : resolved.offset.value) value /= 2 * unit_mm;
+  }
+  return resolved;
+}
+
+SceneRecord place_scene(const SceneRequest& resolved, const BundleContent& content,
+                        std::uint32_t pattern, const PlacedModel& model) {
+  const glm::dquat rotation = rotation_of(resolved.up.value_or(model.up), resolved.turn);
+  const double scale = resolved.size.value;
+  SceneRecord scene{};
+  scene.pattern = pattern;
+  scene.model = model.index;
+  scene.scale = static_cast<float>(scale);
+  std::array<double, 3> offset = resolved.offset.value;
+  for (double& value : offset) value *= 2;  // sides to units of the plane
+  if (!resolved.centred) {
+    offset[2] -= scale * turned_box(content, model, glm::mat3_cast(rotation)).least.z;
+  }
+  for (std::size_t i = 0; i < 3; ++i) scene.offset[i] = static_cast<float>(offset[i]);
+  scene.rotation[0] = static_cast<float>(rotation.x);
+  scene.rotation[1] = static_cast<float>(rotation.y);
+  scene.rotation[2] = static_cast<float>(rotation.z);
+  scene.rotation[3] = static_cast<float>(rotation.w);
+  return scene;
+}
+
+double scene_height_mm(const BundleView& bundle, const SceneRecord& scene) {
+  const ModelRecord& model = bundle.models()[scene.model];
+  const glm::dquat rotation(scene.rotation[3], scene.rotation[0], scene.rotation[1],
+                            scene.rotation[2]);
+  const TurnedBox box =
+      box_of_vertices(model, bundle.layouts()[model.layout], bundle.chunks(), bundle.levels(),
+                      bundle.vertices(), glm::mat3_cast(rotation));
+  return static_cast<double>(scene.scale) * (box.greatest.z - box.least.z) *
+         millimetres_in_unit(bundle.patterns()[scene.pattern]);
+}
+
+}  // namespace modar

@@ -1,0 +1,189 @@
+// Counts what a bundle asks of a device.
+#include "bake/check/device/device_rules.hpp"
+
+#include <algorithm>
+#include <string>
+
+#include "bake/check/verdict.hpp"
+#include "formats/texture_format.hpp"
+
+namespace modar {
+namespace {
+
+constexpr std::uint64_t kMebibyte = 1u << 20;
+/// Vec4s of shaders/model.vert: projection 4, place in the scene 4, light and material 5.
+constexpr int kVertexUniforms = 13;
+/// Vec4s of the fragment shaders: opacity, or a camera picture's range and swap.
+constexpr int kFragmentUniforms = 2;
+constexpr std::uint64_t kDecodedPixelBytes = 3;  ///< RGB8
+
+class DeviceCheck {
+ public:
+  DeviceCheck(const BundleView& bundle, const DeviceProfile& device, const IssueSink& sink)
+      : bundle_(bundle), device_(device), sink_(sink) {
+    // OpenGL ES 3 has it in its core.
+    half_ = device.es_version >= 30 || device.has_extension("GL_OES_vertex_half_float");
+  }
+
+  bool run() {
+    for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) check_texture(t);
+    for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) check_model(m);
+    check_uniforms();
+    check_memory();
+    return good_;
+  }
+
+ private:
+  void tell(WorkstationRule rule, std::string where, const void* place, std::string detail) {
+    Issue issue;
+    issue.kind = &workstation_issue_kind(rule);
+    issue.where = std::move(where);
+    issue.offset =
+        static_cast<std::uint64_t>(static_cast<const std::byte*>(place) - bundle_.bytes().data());
+    issue.detail = std::move(detail) + " on " + std::string(device_.name);
+    good_ = good_ && issue.kind->severity != Severity::kError;
+    sink_(issue);
+  }
+
+  [[nodiscard]] std::string label(const char* what, NameRef name) const {
+    return what + (" '" + std::string(bundle_.name(name)) + "'");
+  }
+
+  void check_texture(std::uint32_t index) {
+    const TextureRecord& texture = bundle_.textures()[index];
+    const std::string where = label("texture", texture.name);
+    const std::uint64_t bytes = bundle_.texture_data(index).size();
+    const TextureFormatInfo& format = *find_texture_format(texture.format);
+    const bool reads = device_.es_version >= static_cast<int>(format.core_since) ||
+                       device_.has_extension(format.gl_extension);
+    const std::uint64_t decoded =
+        bytes / format.block_bytes * format.block_side * format.block_side * kDecodedPixelBytes;
+    texture_bytes_ += reads ? bytes : decoded;
+    const TextureLevelRecord& smallest =
+        bundle_.texture_levels()[texture.first_level + texture.level_count - 1];
+    const std::uint64_t pixels = std::uint64_t{smallest.width} * smallest.height;
+    smallest_bytes_ += (reads ? smallest.size : pixels * kDecodedPixelBytes) *
+                       (smallest.alpha_offset == kNoOffset ? 1 : 2);
+    if (std::max(texture.width, texture.height) >
+        static_cast<std::uint32_t>(device_.max_texture_size)) {
+      tell(WorkstationRule::kDeviceTextureSize, where, &texture.width,
+           std::to_string(texture.width) + " x " + std::to_string(texture.height) +
+               " pixels, at most " + std::to_string(device_.max_texture_size));
+    }
+    if (!reads) {
+      tell(WorkstationRule::kDeviceEtc1, where, &texture.format,
+           std::to_string(bytes) + " bytes become " + std::to_string(decoded));
+    }
+  }
+
+  void check_model(std::uint32_t index) {
+    const ModelRecord& model = bundle_.models()[index];
+    const LayoutRecord& layout = bundle_.layouts()[model.layout];
+    const std::string where = label("model", model.name);
+    if (layout.attribute_count > device_.max_vertex_attributes) {
+      tell(WorkstationRule::kDeviceAttributes, where, &layout,
+           std::to_string(layout.attribute_count) + " attributes, at most " +
+               std::to_string(device_.max_vertex_attributes));
+    }
+    most_coarse_bytes_ = std::max(most_coarse_bytes_, coarse_bytes(index));
+    std::uint64_t half_bytes = 0;
+    for (std::uint32_t a = 0; a < layout.attribute_count; ++a) {
+      const AttributeRecord& attribute = layout.attributes[a];
+      if (attribute.type == static_cast<std::uint8_t>(ComponentType::kHalf)) {
+        half_bytes += 2ull * attribute.components;
+      }
+    }
+    if (half_ || half_bytes == 0) return;
+    widened_bytes_ += half_bytes * model.vertex_count;
+    tell(WorkstationRule::kDeviceHalfFloat, where, &layout,
+         std::to_string(half_bytes) + " bytes of each of " + std::to_string(model.vertex_count) +
+             " vertices");
+  }
+
+  /// Vertices and indices of the coarsest level of each chunk; of a model's stand-in that needs
+  /// least, where it has any.
+  [[nodiscard]] std::uint64_t coarse_bytes(std::uint32_t model) const {
+    const std::uint64_t stride = bundle_.layouts()[bundle_.models()[model].layout].stride;
+    std::uint64_t least = ~std::uint64_t{0};
+    for (std::uint32_t g = 0; g < bundle_.chunk_groups(); ++g) {
+      const ChunkGroup group = bundle_.chunk_group(g);
+      if (group.model != model) continue;
+      std::uint64_t bytes = 0;
+      for (std::uint32_t c = group.first_chunk; c < group.first_chunk + group.chunk_count; ++c) {
+        const ChunkRecord& chunk = bundle_.chunks()[c];
+        const LevelRecord& level = bundle_.levels()[chunk.first_level + chunk.level_count - 1];
+        bytes += std::uint64_t{level.vertex_count} * stride + 2ull * level.index_count;
+      }
+      least = std::min(least, bytes);
+    }
+    return least;
+  }
+
+  void check_uniforms() {
+    if (device_.max_vertex_uniform_vectors >= kVertexUniforms &&
+        device_.max_fragment_uniform_vectors >= kFragmentUniforms) {
+      return;
+    }
+    tell(WorkstationRule::kDeviceUniforms, "shaders", bundle_.bytes().data(),
+         std::to_string(kVertexUniforms) + " in vertex and " + std::to_string(kFragmentUniforms) +
+             " in fragment shaders, at most " + std::to_string(device_.max_vertex_uniform_vectors) +
+             " and " + std::to_string(device_.max_fragment_uniform_vectors));
+  }
+
+  /// The asset that takes most, so that one knows where to begin.
+  [[nodiscard]] std::string largest_asset() const {
+    std::uint64_t most = bundle_.vertices().size() + bundle_.indices().size();
+    std::string name = "the models' vertices and indices";
+    for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) {
+      const std::uint64_t bytes = bundle_.texture_data(t).size();
+      if (bytes <= most) continue;
+      most = bytes;
+      name = label("texture", bundle_.textures()[t].name);
+    }
+    return name + " with " + std::to_string(most) + " bytes";
+  }
+
+  void check_memory() {
+    const std::uint64_t gpu =
+        bundle_.vertices().size() + widened_bytes_ + bundle_.indices().size() + texture_bytes_;
+    const void* first = bundle_.bytes().data();
+    if (gpu > device_.gpu_memory_mib * kMebibyte) {
+      // The renderer keeps to the limit: it leaves out the largest mip levels, and what is nearest
+      // gets its finest levels first.
+      const bool drawn = most_coarse_bytes_ + smallest_bytes_ <= device_.gpu_memory_mib * kMebibyte;
+      tell(drawn ? WorkstationRule::kDeviceGpuDetail : WorkstationRule::kDeviceGpuMemory,
+           largest_asset(), first,
+           std::to_string(gpu) + " bytes in all, at most " +
+               std::to_string(device_.gpu_memory_mib * kMebibyte));
+    }
+    const std::uint64_t file = bundle_.bytes().size();
+    if (file > device_.ram_mib * kMebibyte / 2) {
+      tell(WorkstationRule::kDeviceRam, largest_asset(), first,
+           std::to_string(file) + " bytes, the memory has " +
+               std::to_string(device_.ram_mib * kMebibyte));
+    }
+    if (file > device_.storage_mib * kMebibyte / 2) {
+      tell(WorkstationRule::kDeviceStorage, largest_asset(), first,
+           std::to_string(file) + " bytes, the storage has " +
+               std::to_string(device_.storage_mib * kMebibyte));
+    }
+  }
+
+  const BundleView& bundle_;
+  const DeviceProfile& device_;
+  const IssueSink& sink_;
+  bool half_ = false;
+  bool good_ = true;
+  std::uint64_t texture_bytes_ = 0;
+  std::uint64_t smallest_bytes_ = 0;     ///< of the textures' smallest mip levels
+  std::uint64_t most_coarse_bytes_ = 0;  ///< of the model whose coarsest levels take most
+  std::uint64_t widened_bytes_ = 0;
+};
+
+}  // namespace
+
+bool check_device(const BundleView& bundle, const DeviceProfile& device, const IssueSink& sink) {
+  return DeviceCheck(bundle, device, sink).run();
+}
+
+}  // namespace modar

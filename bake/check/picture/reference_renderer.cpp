@@ -1,0 +1,248 @@
+// Rasterises triangle after triangle into a depth buffer.
+#include "bake/check/picture/reference_renderer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "bake/mesh/tri_mesh.hpp"
+#include "formats/base/colour.hpp"
+
+namespace modar {
+namespace {
+
+/// A vertex after lighting and projection.
+struct Lit {
+  double x = 0;  ///< pixels
+  double y = 0;
+  double inverse_depth = 0;  ///< 0: behind the camera
+  glm::dvec3 light{1.0};     ///< linear
+  glm::dvec3 added{0.0};     ///< linear
+  glm::dvec3 diffuse{1.0};   ///< as stored
+  glm::dvec2 uv{0.0};
+  glm::dvec4 colour{1.0};
+};
+
+/// Texel of a level, wrapped or clamped.
+glm::dvec4 texel(const RgbaImage& image, long x, long y, bool repeat) {
+  const long width = image.width;
+  const long height = image.height;
+  x = repeat ? (x % width + width) % width : std::clamp(x, 0L, width - 1);
+  y = repeat ? (y % height + height) % height : std::clamp(y, 0L, height - 1);
+  const std::uint8_t* p = image.pixels.data() + 4 * (static_cast<std::size_t>(y) * image.width +
+                                                     static_cast<std::size_t>(x));
+  return glm::dvec4(p[0], p[1], p[2], p[3]) / 255.0;
+}
+
+glm::dvec4 bilinear(const RgbaImage& image, const glm::dvec2& uv, bool repeat) {
+  const double x = uv.x * image.width - 0.5;
+  const double y = uv.y * image.height - 0.5;
+  const auto left = static_cast<long>(std::floor(x));
+  const auto top = static_cast<long>(std::floor(y));
+  const double u = x - static_cast<double>(left);
+  const double v = y - static_cast<double>(top);
+  return glm::mix(
+      glm::mix(texel(image, left, top, repeat), texel(image, left + 1, top, repeat), u),
+      glm::mix(texel(image, left, top + 1, repeat), texel(image, left + 1, top + 1, repeat), u), v);
+}
+
+}  // namespace
+
+glm::dvec3 srgb_to_linear(const glm::dvec3& stored) {
+  return {linear_of_srgb(stored.r), linear_of_srgb(stored.g), linear_of_srgb(stored.b)};
+}
+
+glm::dvec3 linear_to_srgb(const glm::dvec3& linear) {
+  return {srgb_of_linear(linear.r), srgb_of_linear(linear.g), srgb_of_linear(linear.b)};
+}
+
+glm::dvec4 look_up(const SoftTexture& texture, const glm::dvec2& uv, double level) {
+  const double top = static_cast<double>(texture.levels.size() - 1);
+  level = std::clamp(level, 0.0, top);
+  const auto fine = static_cast<std::size_t>(level);
+  const auto coarse = std::min(fine + 1, texture.levels.size() - 1);
+  return glm::mix(bilinear(texture.levels[fine], uv, texture.repeat),
+                  bilinear(texture.levels[coarse], uv, texture.repeat),
+                  level - static_cast<double>(fine));
+}
+
+Result<std::vector<SoftTexture>> load_textures(const TriMesh& mesh, unsigned jobs) {
+  std::vector<SoftTexture> textures(mesh.materials.size());
+  const std::vector<bool> repeats = repeating_materials(mesh);
+  for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
+    if (mesh.uvs.empty() || mesh.materials[m].diffuse_map.empty()) continue;
+    MODAR_ASSIGN(const RgbaImage image, read_image(mesh.materials[m].diffuse_map));
+    textures[m].repeat = repeats[m];
+    textures[m].levels = mip_chain(image, repeats[m], jobs);
+  }
+  return textures;
+}
+
+namespace {
+
+class Canvas {
+ public:
+  Canvas(const TriMesh& mesh, const std::vector<SoftTexture>& textures, const Camera& camera,
+         const glm::dmat4& to_eye, const RenderOptions& options)
+      : mesh_(mesh),
+        textures_(textures),
+        camera_(camera),
+        to_eye_(to_eye),
+        turn_(glm::transpose(glm::inverse(glm::dmat3(to_eye)))),
+        to_world_(glm::transpose(glm::dmat3(DrawItem().world_to_eye))),
+        light_(options.light ? *options.light : neutral_room()),
+        options_(options) {
+    image_.width = static_cast<std::uint32_t>(camera.width);
+    image_.height = static_cast<std::uint32_t>(camera.height);
+    depth_.assign(std::size_t{image_.width} * image_.height, 0.0);
+    const glm::dvec4 clear(options.clear_colour);
+    for (std::size_t i = 0; i < depth_.size(); ++i) {
+      for (int c = 0; c < 4; ++c) image_.pixels.push_back(to_byte(c < 3 ? clear[c] : 1.0));
+    }
+  }
+
+  RgbaImage draw() {
+    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
+      const std::uint32_t material = mesh_.triangle_material[t];
+      const auto& corners = mesh_.triangles[t];
+      fill({shade(corners[0], material), shade(corners[1], material), shade(corners[2], material)},
+           textures_[material]);
+    }
+    return std::move(image_);
+  }
+
+ private:
+  static std::uint8_t to_byte(double value) {
+    return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 1.0) * 255.0));
+  }
+
+  /// What a white surface of that normal gets from all around, with factors on the parts that are
+  /// linear and quadratic in it.
+  [[nodiscard]] glm::dvec3 sky(const glm::dvec3& n, double linear, double quadratic) const {
+    const double x = n.x;
+    const double y = n.y;
+    const double z = n.z;
+    const std::array<double, 9> terms = {
+        1, y, z, x, x * y, y * z, 3 * z * z - 1, z * x, x * x - y * y};
+    glm::dvec3 sum(0.0);
+    for (std::size_t i = 0; i < terms.size(); ++i) {
+      const double factor = i == 0 ? 1.0 : (i < 4 ? linear : quadratic);
+      sum += factor * terms[i] * glm::dvec3(light_.sky[i]);
+    }
+    return glm::max(sum, 0.0) * static_cast<double>(options_.ambient_strength);
+  }
+
+  [[nodiscard]] Lit shade(std::uint32_t v, std::uint32_t material) const {
+    const SourceMaterial& m = mesh_.materials[material];
+    const glm::dvec3 eye(to_eye_ * glm::dvec4(mesh_.positions[v], 1.0));
+    const glm::dvec3 n = glm::normalize(turn_ * glm::dvec3(mesh_.normals[v]));
+    const glm::dvec3 world = to_world_ * n;
+    const glm::dvec3 to_key = glm::normalize(glm::dvec3(light_.direction));
+    const glm::dvec3 halfway = glm::normalize(to_key - glm::normalize(to_world_ * eye));
+    const glm::dvec3 key = glm::dvec3(light_.key) * static_cast<double>(options_.light_strength);
+    const double shine = m.shininess > 0
+                             ? std::pow(std::max(glm::dot(world, halfway), 1e-4),
+                                        static_cast<double>(std::min(m.shininess, kMostShininess)))
+                             : 0.0;
+    const glm::dvec3 ray = glm::normalize(to_world_ * eye);
+    const glm::dvec4 factors(mirror_factors(m.shininess, m.reflectance, m.metalness));
+    const glm::dvec3 mirrored = sky(glm::reflect(ray, world), factors.x, factors.y);
+    const double edge = std::pow(1 - std::min(std::fabs(glm::dot(world, ray)), 1.0), 5.0);
+    Lit lit;
+    lit.light = sky(world, 1, 1) + key * std::max(glm::dot(world, to_key), 0.0);
+    lit.light = glm::mix(lit.light, mirrored, static_cast<double>(m.metalness));
+    lit.added = srgb_to_linear(glm::dvec3(m.emission)) +
+                srgb_to_linear(glm::dvec3(m.specular)) * key * shine +
+                mirrored * (factors.z + factors.w * edge);
+    lit.diffuse = glm::dvec3(m.diffuse);
+    if (!mesh_.uvs.empty()) lit.uv = mesh_.uvs[v];
+    if (!mesh_.colours.empty()) lit.colour = glm::dvec4(mesh_.colours[v]) / 255.0;
+    if (eye.z >= 0) return lit;
+    lit.inverse_depth = -1.0 / eye.z;
+    lit.x = camera_.cx + camera_.fx * eye.x * lit.inverse_depth;
+    lit.y = camera_.cy - camera_.fy * eye.y * lit.inverse_depth;
+    return lit;
+  }
+
+  void fill(const std::array<Lit, 3>& v, const SoftTexture& texture) {
+    for (const Lit& lit : v) {
+      if (lit.inverse_depth == 0) return;  // views keep models before the camera
+    }
+    const double area =
+        (v[1].x - v[0].x) * (v[2].y - v[0].y) - (v[2].x - v[0].x) * (v[1].y - v[0].y);
+    // Counter-clockwise is front; rows grow downwards. The device draws fronts only, too.
+    if (!(area < 0)) return;
+    const auto [low_x, high_x] = std::minmax({v[0].x, v[1].x, v[2].x});
+    const auto [low_y, high_y] = std::minmax({v[0].y, v[1].y, v[2].y});
+    const int left = std::max(0, static_cast<int>(std::ceil(low_x)));
+    const int right = std::min(camera_.width - 1, static_cast<int>(std::floor(high_x)));
+    const int top = std::max(0, static_cast<int>(std::ceil(low_y)));
+    const int bottom = std::min(camera_.height - 1, static_cast<int>(std::floor(high_y)));
+    // Barycentric coordinates are linear on the screen.
+    const glm::dvec3 step_x = glm::dvec3(v[1].y - v[2].y, v[2].y - v[0].y, v[0].y - v[1].y) / area;
+    const glm::dvec3 step_y = glm::dvec3(v[2].x - v[1].x, v[0].x - v[2].x, v[1].x - v[0].x) / area;
+    for (int y = top; y <= bottom; ++y) {
+      for (int x = left; x <= right; ++x) {
+        const glm::dvec3 b = glm::dvec3(1, 0, 0) + step_x * (x - v[0].x) + step_y * (y - v[0].y);
+        if (b.x < 0 || b.y < 0 || b.z < 0) continue;
+        put(v, texture, b, step_x, step_y, x, y);
+      }
+    }
+  }
+
+  void put(const std::array<Lit, 3>& v, const SoftTexture& texture, const glm::dvec3& b,
+           const glm::dvec3& step_x, const glm::dvec3& step_y, int x, int y) {
+    const glm::dvec3 inverse(v[0].inverse_depth, v[1].inverse_depth, v[2].inverse_depth);
+    const double near = glm::dot(b, inverse);
+    const std::size_t at = static_cast<std::size_t>(y) * image_.width + static_cast<std::size_t>(x);
+    if (near <= depth_[at]) return;
+    depth_[at] = near;
+    const glm::dvec3 w = b * inverse / near;
+    glm::dvec4 base = w.x * v[0].colour + w.y * v[1].colour + w.z * v[2].colour;
+    if (!texture.levels.empty()) {
+      const auto uv_at = [&](const glm::dvec3& weights) {
+        return weights.x * v[0].uv + weights.y * v[1].uv + weights.z * v[2].uv;
+      };
+      const glm::dvec2 uv = uv_at(w);
+      const glm::dvec2 size(texture.levels[0].width, texture.levels[0].height);
+      // Derivative of the quotient (uv / z) / (1 / z).
+      const auto slope = [&](const glm::dvec3& step) {
+        const glm::dvec3 change = step * inverse / near;
+        return glm::length((uv_at(change) - uv * (change.x + change.y + change.z)) * size);
+      };
+      const double texels = std::max({slope(step_x), slope(step_y), 1e-9});
+      base *= glm::dvec4(glm::dvec3(look_up(texture, uv, std::log2(texels))), 1.0);
+    }
+    const glm::dvec3 light = w.x * v[0].light + w.y * v[1].light + w.z * v[2].light;
+    const glm::dvec3 added = w.x * v[0].added + w.y * v[1].added + w.z * v[2].added;
+    const glm::dvec3 colour = linear_to_srgb(
+        srgb_to_linear(v[0].diffuse) * srgb_to_linear(glm::dvec3(base)) * light + added);
+    for (int c = 0; c < 3; ++c)
+      image_.pixels[4 * at + static_cast<std::size_t>(c)] = to_byte(colour[c]);
+  }
+
+  const TriMesh& mesh_;
+  const std::vector<SoftTexture>& textures_;
+  Camera camera_;
+  glm::dmat4 to_eye_;
+  glm::dmat3 turn_;
+  glm::dmat3 to_world_;
+  RoomLight light_;
+  const RenderOptions& options_;
+  RgbaImage image_;
+  std::vector<double> depth_;  // 1 / z of what is nearest
+};
+
+}  // namespace
+
+RgbaImage render_reference(const TriMesh& mesh, const std::vector<SoftTexture>& textures,
+                           const Camera& camera, const glm::dmat4& to_eye,
+                           const RenderOptions& options) {
+  return Canvas(mesh, textures, camera, to_eye, options).draw();
+}
+
+}  // namespace modar

@@ -1,0 +1,247 @@
+// Twelve views, two renderers, two measures.
+#include "bake/check/picture/visual_check.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "bake/bundle/bundle_builder.hpp"
+#include "bake/check/picture/reference_renderer.hpp"
+#include "bake/check/verdict.hpp"
+#include "bake/image/difference.hpp"
+#include "bake/import/read_model.hpp"
+#include "bake/mesh/weld/weld.hpp"
+#include "modar/gl_context.hpp"
+#include "modar/renderer.hpp"
+
+namespace modar {
+namespace {
+
+constexpr std::size_t kViews = 12;
+constexpr double kDistance = 4.0;  // of the eye from the middle of a model in [-1,1]
+
+std::array<glm::dvec3, kViews> view_directions() {
+  const double golden = (1 + std::sqrt(5.0)) / 2;
+  std::array<glm::dvec3, kViews> views;
+  std::size_t n = 0;
+  for (const double a : {-1.0, 1.0}) {
+    for (const double b : {-golden, golden}) {
+      views[n++] = {0, a, b};
+      views[n++] = {a, b, 0};
+      views[n++] = {b, 0, a};
+    }
+  }
+  return views;
+}
+
+/// The part of both images that shows something, so that empty surroundings earn nothing.
+struct Crop {
+  std::uint32_t left = 0;
+  std::uint32_t top = 0;
+  std::uint32_t right = 0;  ///< behind the last
+  std::uint32_t bottom = 0;
+};
+
+bool is_clear(const std::uint8_t* pixel, const std::array<std::uint8_t, 3>& clear) {
+  return std::equal(clear.begin(), clear.end(), pixel);
+}
+
+Crop shown_part(const RgbaImage& a, const RgbaImage& b, const std::array<std::uint8_t, 3>& clear) {
+  Crop crop{a.width, a.height, 0, 0};
+  for (std::uint32_t y = 0; y < a.height; ++y) {
+    for (std::uint32_t x = 0; x < a.width; ++x) {
+      const std::size_t at = 4 * (std::size_t{y} * a.width + x);
+      if (is_clear(&a.pixels[at], clear) && is_clear(&b.pixels[at], clear)) continue;
+      crop = {std::min(crop.left, x), std::min(crop.top, y), std::max(crop.right, x + 1),
+              std::max(crop.bottom, y + 1)};
+    }
+  }
+  return crop;
+}
+
+RgbaImage cut(const RgbaImage& image, const Crop& crop) {
+  RgbaImage out{crop.right - crop.left, crop.bottom - crop.top, {}};
+  for (std::uint32_t y = crop.top; y < crop.bottom; ++y) {
+    const auto row = image.pixels.begin() +
+                     static_cast<std::ptrdiff_t>(4 * (std::size_t{y} * image.width + crop.left));
+    out.pixels.insert(out.pixels.end(), row, row + static_cast<std::ptrdiff_t>(4 * out.width));
+  }
+  return out;
+}
+
+bool translucent(const TriMesh& mesh) {
+  return std::any_of(mesh.materials.begin(), mesh.materials.end(), [](const SourceMaterial& m) {
+    return m.opacity < 1.0f || !m.alpha_map.empty();
+  });
+}
+
+class Looker {
+ public:
+  Looker(const BundleView& bundle, const VisualOptions& options, const IssueSink& sink)
+      : bundle_(bundle), options_(options), sink_(sink) {
+    render_.clear_colour = {0.5f, 0.5f, 0.5f, 1.0f};
+    clear_ = {128, 128, 128};
+    camera_ = default_camera(options.side, options.side);
+  }
+
+  Result<void> set_up() {
+    MODAR_ASSIGN(context_, GlContext::create_offscreen());
+    MODAR_ASSIGN(renderer_, Renderer::create(bundle_, probe_gl_caps()));
+    renderer_->set_options(render_);
+    return renderer_->resize(options_.side, options_.side);
+  }
+
+  Result<ModelLook> look(std::uint32_t index, const std::string& path) {
+    Report quiet;
+    MODAR_ASSIGN(SourceModel source, read_model(path, options_.jobs));
+    MODAR_ASSIGN(const TriMesh mesh, weld(std::move(source), quiet, {options_.jobs}));
+    ModelLook look;
+    look.name = bundle_.name(bundle_.models()[index].name);
+    look.judged = !translucent(mesh);
+    if (!look.judged) return look;
+    MODAR_ASSIGN(const std::vector<SoftTexture> textures, load_textures(mesh, options_.jobs));
+    compare(index, mesh, textures, look);
+    if (!options_.picture_folder.empty()) {
+      look.picture =
+          (std::filesystem::path(options_.picture_folder) / (look.name + ".png")).string();
+      MODAR_TRY(write_png(worst_, look.picture));
+    }
+    judge(index, look);
+    return look;
+  }
+
+ private:
+  void compare(std::uint32_t index, const TriMesh& mesh, const std::vector<SoftTexture>& textures,
+               ModelLook& look) {
+    double radius = 0;
+    for (const glm::dvec3& p : mesh.positions) radius = std::max(radius, glm::length(p));
+    // The sphere around the model fills the view.
+    camera_.fx = camera_.fy =
+        0.49 * options_.side * std::sqrt(kDistance * kDistance / (radius * radius) - 1);
+    look.ssim_worst = 2;
+    look.ssim_mean = look.delta_e_mean = 0;
+    const auto views = view_directions();
+    double shown_views = 0;
+    for (std::size_t view = 0; view < kViews; ++view) {
+      const glm::dmat4 to_eye =
+          glm::lookAt(kDistance * glm::normalize(views[view]), glm::dvec3(0.0),
+                      std::fabs(views[view].x) > 1 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0));
+      const RgbaImage wanted = render_reference(mesh, textures, camera_, to_eye, render_);
+      const RgbaImage shown = draw(index, to_eye);
+      const Crop crop = shown_part(wanted, shown, clear_);
+      if (crop.right <= crop.left) continue;
+      const double similar = ssim(cut(wanted, crop), cut(shown, crop));
+      const double off = mean_delta_e(wanted, shown, clear_);
+      look.ssim_mean += similar;
+      look.delta_e_mean += off;
+      ++shown_views;
+      look.delta_e_worst = std::max(look.delta_e_worst, off);
+      if (similar < look.ssim_worst) {
+        look.ssim_worst = similar;
+        look.worst_view = static_cast<int>(view);
+        worst_ = quality_picture(wanted, shown);
+      }
+      if (options_.progress) {
+        options_.progress((index + static_cast<double>(view + 1) / kViews) /
+                          bundle_.models().size());
+      }
+    }
+    // A sheet shows nothing from behind.
+    if (shown_views == 0) return;
+    look.ssim_mean /= shown_views;
+    look.delta_e_mean /= shown_views;
+  }
+
+  RgbaImage draw(std::uint32_t index, const glm::dmat4& to_eye) {
+    const DrawItem item{index, glm::mat4(to_eye)};
+    const DepthRange range = depth_range(bundle_, {&item, 1});
+    renderer_->render(RgbImage{}, gl_projection(camera_, range.near_plane, range.far_plane),
+                      {&item, 1});
+    RgbaImage image{
+        static_cast<std::uint32_t>(options_.side), static_cast<std::uint32_t>(options_.side), {}};
+    image.pixels.resize(4 * std::size_t{image.width} * image.height);
+    renderer_->read_pixels(image.pixels);
+    return image;
+  }
+
+  void judge(std::uint32_t index, const ModelLook& look) {
+    if (look.ssim_worst >= options_.least_ssim && look.delta_e_worst <= options_.greatest_delta_e)
+      return;
+    const ModelRecord& model = bundle_.models()[index];
+    sink_(Issue{&workstation_issue_kind(WorkstationRule::kVisualDiffers),
+                "model '" + look.name + "'",
+                static_cast<std::uint64_t>(reinterpret_cast<const std::byte*>(&model) -
+                                           bundle_.bytes().data()),
+                "in the worst of 12 views SSIM is " + std::to_string(look.ssim_worst) +
+                    " (at least " + std::to_string(options_.least_ssim) +
+                    "), the colour is off by " + std::to_string(look.delta_e_worst) + " (at most " +
+                    std::to_string(options_.greatest_delta_e) + ")"});
+  }
+
+  const BundleView& bundle_;
+  const VisualOptions& options_;
+  const IssueSink& sink_;
+  RenderOptions render_;
+  std::array<std::uint8_t, 3> clear_{};
+  Camera camera_;
+  std::unique_ptr<GlContext> context_;
+  std::unique_ptr<Renderer> renderer_;
+  RgbaImage worst_;
+};
+
+}  // namespace
+
+glm::dvec3 lab_of(const std::uint8_t* pixel) {
+  static const std::vector<double> table = [] {
+    std::vector<double> values;
+    for (int i = 0; i < 256; ++i) values.push_back(srgb_to_linear(glm::dvec3(i / 255.0)).x);
+    return values;
+  }();
+  const double r = table[pixel[0]];
+  const double g = table[pixel[1]];
+  const double b = table[pixel[2]];
+  const auto f = [](double t) {
+    return t > 216.0 / 24389 ? std::cbrt(t) : (24389.0 / 27 * t + 16) / 116;
+  };
+  const double x = f((0.4124564 * r + 0.3575761 * g + 0.1804375 * b) / 0.95047);
+  const double y = f(0.2126729 * r + 0.7151522 * g + 0.0721750 * b);
+  const double z = f((0.0193339 * r + 0.1191920 * g + 0.9503041 * b) / 1.08883);
+  return {116 * y - 16, 500 * (x - y), 200 * (y - z)};
+}
+
+double mean_delta_e(const RgbaImage& a, const RgbaImage& b,
+                    const std::array<std::uint8_t, 3>& clear) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < a.pixels.size(); i += 4) {
+    if (is_clear(&a.pixels[i], clear) || is_clear(&b.pixels[i], clear)) continue;
+    sum += glm::length(lab_of(&a.pixels[i]) - lab_of(&b.pixels[i]));
+    ++count;
+  }
+  return count == 0 ? 0.0 : sum / static_cast<double>(count);
+}
+
+Result<std::vector<ModelLook>> check_looks(const BundleView& bundle, const VisualOptions& options,
+                                           const IssueSink& sink) {
+  std::vector<ModelLook> looks;
+  if (bundle.models().empty()) return looks;
+  Looker looker(bundle, options, sink);
+  MODAR_TRY(looker.set_up());
+  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
+    const ModelRecord& model = bundle.models()[m];
+    const auto path = std::find_if(
+        options.models.begin(), options.models.end(),
+        [&](const ModelRequest& source) { return source.name == bundle.name(model.name); });
+    if (path == options.models.end()) continue;  // SOURCE_MISSING reports it
+    MODAR_ASSIGN(ModelLook look, looker.look(m, path->path));
+    looks.push_back(std::move(look));
+  }
+  return looks;
+}
+
+}  // namespace modar

@@ -1,0 +1,74 @@
+// Models out of a bundle as files that viewers open: GLB for any, USDZ for those of iPhones (Quick
+// Look).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include "bake/texture/texture.hpp"
+#include "formats/base/error.hpp"
+#include "formats/bundle_view.hpp"
+
+namespace modar {
+
+/// A texture of the bundle, decoded.
+struct GlbImage {
+  std::uint32_t texture = 0;  ///< index into the bundle's textures
+  RgbaImage pixels;
+};
+
+/// A model and where it is: its own space, in [-1,1], to that of the file.
+struct RoomModel {
+  std::uint32_t model = 0;
+  glm::dmat4 place{1.0};
+};
+
+/// The finest level of a chunk, decoded; only the vertices that it uses, in their order.
+struct DecodedLevel {
+  std::vector<std::uint16_t> indices;
+  std::vector<glm::dvec3> positions;  ///< model space, in [-1,1]
+  std::vector<glm::dvec3> normals;
+  std::vector<glm::dvec2> uvs;      ///< v down; empty: none
+  std::vector<glm::dvec4> colours;  ///< sRGB; empty: none
+};
+/// Errors: kInvalidInput "model.index" where an index exceeds its vertices.
+Result<DecodedLevel> decode_level(const BundleView& bundle, const LayoutRecord& layout,
+                                  const ChunkRecord& chunk);
+
+/// The roughness whose highlight is as wide as that of the Phong exponent.
+double roughness_of(float shininess);
+
+/// Whether any material of the model shows the texture.
+bool shows_texture(const BundleView& bundle, const ModelRecord& model, std::uint32_t texture);
+
+/// Writes level 0 of a model: one primitive a chunk, positions in source units (about the model's
+/// centre, which is the node's translation, so that large coordinates keep their digits in floats),
+/// normals, uv and colours as they decode, materials, textures as PNG.
+/// images: may lack textures; their materials then have their colour alone.
+/// Errors: those of decode_level(); kUnsupported "glb.too-large" beyond 4 GB; kIo.
+Result<void> write_glb(const BundleView& bundle, std::uint32_t model,
+                       std::span<const GlbImage> images, const std::string& path);
+
+/// The same of models that stand together, in the space that their places lead to.
+Result<std::vector<std::byte>> encode_glb(const BundleView& bundle,
+                                          std::span<const RoomModel> models,
+                                          std::span<const GlbImage> images);
+
+/// A stored ZIP of a scene description as text (Model.usda, y up, metres) and its textures (JPEG,
+/// or PNG where one has alpha), each at a multiple of 64 bytes, as the USDZ specification asks.
+/// Meshes are the finest level, materials UsdPreviewSurface. images: may lack textures; their
+/// materials then have their colour alone. Errors: those of decode_level(); kUnsupported
+/// "usdz.too-large" beyond 4 GB.
+Result<std::vector<std::byte>> encode_usdz(const BundleView& bundle,
+                                           std::span<const RoomModel> models,
+                                           std::span<const GlbImage> images);
+
+}  // namespace modar

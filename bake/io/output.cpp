@@ -1,0 +1,103 @@
+#include "bake/io/output.hpp"
+
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <system_error>
+
+#include "bake/io/input.hpp"
+#include "bake/io/terminal.hpp"
+#include "formats/base/atomic_file.hpp"
+
+namespace modar {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kFolderMark = ".modar-output";
+
+}  // namespace
+
+Result<void> make_output_folder(const std::string& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) {
+    return fail(ExitCode::kIo, "io.folder", folder, error.message(),
+                "name a folder that can be created");
+  }
+  return {};
+}
+
+Result<void> claim_output_folder(const std::string& folder, bool force) {
+  const fs::path mark = fs::path(folder) / kFolderMark;
+  std::error_code error;
+  const bool empty = !fs::exists(folder, error) || fs::is_empty(folder, error);
+  if (!error && !empty && !force && !fs::exists(mark, error)) {
+    return fail(ExitCode::kUsage, "out.foreign-folder", folder,
+                "the folder contains files that modar has not written",
+                "name a new or an empty folder, or write into this one with --force");
+  }
+  MODAR_TRY(make_output_folder(folder));
+  return write_file(mark.string(), "Files of this folder were written by modar.\n");
+}
+
+Result<void> keep_inputs(const std::string& output, const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::error_code error;
+    if (!fs::equivalent(output, input, error) || error) continue;
+    return fail(ExitCode::kUsage, "out.input", output,
+                "the output would overwrite the input " + input, "name another output");
+  }
+  return {};
+}
+
+Result<void> keep_other_kinds(const std::string& output, const std::string& kind,
+                              const std::function<bool(std::string_view)>& is_ours) {
+  if (!is_regular_file(output)) return {};
+  std::ifstream file(output, std::ios::binary);
+  std::string start(4096, '\0');
+  file.read(start.data(), static_cast<std::streamsize>(start.size()));
+  start.resize(static_cast<std::size_t>(file.gcount()));
+  if (start.empty() || is_ours(start)) return {};
+  return fail(ExitCode::kUsage, "out.foreign", output,
+              "the output would overwrite a file that is not a " + kind, "name another output");
+}
+
+Result<void> try_output(const std::string& path, std::uint64_t bytes) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    return fail(ExitCode::kIo, "io.folder", path, "it is a folder", "name a file in it");
+  }
+  const fs::path folder = fs::absolute(path, error).parent_path();
+  std::string probe = (folder / ".modar-XXXXXX").string();
+  const int file = ::mkstemp(probe.data());
+  if (file < 0) {
+    return fail(ExitCode::kIo, "io.folder", path,
+                "its folder cannot be written: " + std::string(std::strerror(errno)),
+                "name a writable place");
+  }
+  ::close(file);
+  ::unlink(probe.c_str());
+  const fs::space_info space = fs::space(folder, error);
+  if (error || space.available >= bytes) return {};
+  return fail(ExitCode::kIo, "io.space", path,
+              "only " + human_bytes(space.available) + " are free there, and it needs about " +
+                  human_bytes(bytes),
+              "free some space, or name another place");
+}
+
+std::uint64_t file_bytes(const std::vector<std::string>& paths) {
+  std::uint64_t sum = 0;
+  for (const std::string& path : paths) {
+    std::error_code error;
+    const std::uintmax_t bytes = fs::file_size(path, error);
+    if (!error) sum += bytes;
+  }
+  return sum;
+}
+
+}  // namespace modar
