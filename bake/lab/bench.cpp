@@ -11,6 +11,7 @@
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/io/terminal.hpp"
 #include "bake/lab/bench_parts.hpp"
+#include "bake/lab/clutter_bench.hpp"
 #include "bake/lab/etc1_bench.hpp"
 #include "bake/lab/extended_bench.hpp"
 #include "bake/lab/light_bench.hpp"
@@ -175,6 +176,23 @@ BenchResult bench_extended_rows(const BenchOptions& command) {
   return rows;
 }
 
+/// Finds of what is not there.
+BenchResult bench_clutter_rows(const BenchOptions& command) {
+  PoseBenchOptions options;
+  options.seed = command.pose.seed;
+  options.known_camera = command.pose.known_camera;
+  options.clutter_frames = command.pose.clutter > 0 ? command.pose.clutter : 20000;
+  if (!command.pose.patterns.empty()) {
+    MODAR_ASSIGN(options.patterns, pictures_of(command.pose.patterns));
+  }
+  MODAR_ASSIGN(options.backgrounds, pictures_of(command.pose.backgrounds));
+  ProgressBar bar(command.pose.quiet || command.json);
+  auto rows = bench_clutter(options,
+                            [&bar](const std::string& what, double done) { bar.show(what, done); });
+  bar.clear();
+  return rows;
+}
+
 /// Videos of real things, beside other methods.
 BenchResult bench_wild_rows(const BenchOptions& command) {
   WildBenchOptions options;
@@ -225,6 +243,10 @@ const std::vector<Bench>& benches() {
        "the pose of a pattern out of sight, in rendered rooms, or blanked in a video, against the "
        "goals",
        bench_extended_rows},
+      {"clutter", false, "--backgrounds DIR [--patterns DIR] [--clutter N]",
+       "frames (20,000 of them) in which 30 hard patterns are found that they do not show, next to "
+       "all frames",
+       bench_clutter_rows},
       {"wild", true, "CLIPS [--patterns DIR] [--only TEXT] [--parameters none]",
        "a folder of videos of real things with their truths (ours, POT-210, PlanarTrack): the pose "
        "loop with an unknown camera, against SIFT and ORB with a RANSAC homography and the ModAR "

@@ -34,13 +34,14 @@ Result<ExitCode> print_rows(const BenchOptions& bench) {
 }
 
 void add_pose_options(CommandLine& line, PoseBenchRequest& pose) {
-  line.group("Tracking: pose, wild, extended (light and render where it says so)");
+  line.group("Tracking: pose, wild, extended, clutter (light and render where it says so)");
   line.option(
       "--patterns", &pose.patterns,
       "Folder of pattern pictures, or one picture (light: one picture; wild: patterns to look for "
       "in clips that show none)");
   line.option("--backgrounds", &pose.backgrounds, "Folder of photos without a pattern");
-  line.group("Tracking: pose, wild, extended (light and render where it says so)", Shown::kInFull);
+  line.group("Tracking: pose, wild, extended, clutter (light and render where it says so)",
+             Shown::kInFull);
   line.option("--video", &pose.video,
               "Also measure on a video (extended: a video to blank; render: play it headless)");
   line.option("--truth", &pose.truth, "True corners of the video's pattern (CSV)");

@@ -48,6 +48,15 @@ constexpr double kBentPixels = 5.0;
 constexpr double kMapBentPixels = 10.0;
 constexpr double kFlatMapShare = 0.9;
 
+// Share of agreeing cells below which these must look like the print's own: their mean correlation,
+// and kNeighbour for each of a cell's eight neighbours that agrees, too. What hides a print leaves
+// whole parts of it, alike to 0.86 to 1.1 by this sum in 186 frames, half and 70 % covered or under
+// glare; cells of other regular prints agree here and there, and had 0.74 to 0.86 where such prints
+// were taken for each other (`modar-lab bench clutter`).
+constexpr double kPlainShare = 0.5;
+constexpr double kNeighbour = 0.04;
+constexpr double kOwnLook = 0.855;
+
 constexpr std::uint8_t kForFlip[2] = {1, 2};
 constexpr std::uint8_t kAgainstFlip[2] = {4, 8};
 
@@ -222,6 +231,28 @@ double PrintVerifier::agreeing_share(const Evidence& seen) {
   return textured > 0 ? 1.0 * agreeing / textured : 0.0;
 }
 
+/// Whether the few cells of a flat print that agree do so here and there, and roughly.
+bool PrintVerifier::scattered(const Evidence& seen) {
+  if (agreeing_share(seen) >= kPlainShare) return false;
+  double look = 0;
+  int agreeing = 0;
+  for (int at = 0; at < kCells; ++at) {
+    const Cell& cell = seen.cells[static_cast<std::size_t>(at)];
+    if (cell.state != CellState::kAgrees) continue;
+    ++agreeing;
+    look += 0.01 * cell.likeness - kNeighbour;  // it is none of its neighbours
+    for (int y = std::max(0, at / kCellSide - 1); y <= std::min(kCellSide - 1, at / kCellSide + 1);
+         ++y) {
+      for (int x = std::max(0, at % kCellSide - 1);
+           x <= std::min(kCellSide - 1, at % kCellSide + 1); ++x) {
+        const Cell& near = seen.cells[static_cast<std::size_t>(y * kCellSide + x)];
+        look += near.state == CellState::kAgrees ? kNeighbour : 0.0;
+      }
+    }
+  }
+  return look < kOwnLook * agreeing;
+}
+
 void PrintVerifier::forget_mirrors(Evidence& seen) {
   for (Cell& cell : seen.cells) cell.flips = 0;
   seen.flipped = false;
@@ -238,7 +269,7 @@ void PrintVerifier::measure(const TrackedPattern& print, const FrameView& frame,
   seen.was_bent = bent;
 }
 
-PrintVerifier::Verification PrintVerifier::conclude(Evidence& seen) {
+PrintVerifier::Verification PrintVerifier::conclude(const TrackedPattern& print, Evidence& seen) {
   int textured = 0;
   int printed = 0;
   int differing = 0;
@@ -265,6 +296,9 @@ PrintVerifier::Verification PrintVerifier::conclude(Evidence& seen) {
   if (most >= kFlippedCells) seen.flipped = true;
   if (most <= -kFlippedCells && agreeing >= kSureShare) seen.flipped = false;
   Verification verification;
+  if (print.surface.flat() && scattered(seen)) {
+    verification.reason = Reason::kFailedVerification;
+  }
   if (seen.curved) verification.reason = Reason::kCurved;
   if (seen.other_print || seen.other_details || seen.flipped)
     verification.reason = Reason::kOtherPrint;
@@ -320,7 +354,7 @@ PrintVerifier::Verification PrintVerifier::verify_found(std::size_t pattern, con
     forget_mirrors(seen);
   }
   measure(patterns_[pattern], frame, track, true, seen);
-  Verification verification = conclude(seen);
+  Verification verification = conclude(patterns_[pattern], seen);
   verification.actual_pattern = find_actual_pattern(pattern, frame, track, 8);
   return verification;
 }
@@ -338,7 +372,7 @@ PrintVerifier::Verification PrintVerifier::verify_tracked(std::size_t pattern,
   if (seen.next_cell / kCellsOfFrame % kBendEvery == 0) {
     measure(patterns_[pattern], frame, track, false, seen);
   }
-  Verification verification = conclude(seen);
+  Verification verification = conclude(patterns_[pattern], seen);
   verification.actual_pattern = find_actual_pattern(pattern, frame, track, 1);
   return verification;
 }

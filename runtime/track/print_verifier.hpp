@@ -35,7 +35,7 @@ class PrintVerifier {
   explicit PrintVerifier(std::span<const TrackedPattern> patterns, bool known_camera = true);
 
   struct Verification {
-    Reason reason = Reason::kVisible;  ///< or kOtherPrint, kCurved: do not show it
+    Reason reason = Reason::kVisible;  ///< or why it is not shown
     double agreeing = 0;               ///< share of the textured cells in view that agree, 0 to 1
     double likeness = 0;               ///< mean correlation of these cells, 0 to 1
     std::int32_t actual_pattern = -1;  ///< the pattern that the frame shows instead; -1: none
@@ -94,8 +94,9 @@ class PrintVerifier {
                                    int work);
   bool related_to(std::size_t a, std::size_t b, int& work);
   static double agreeing_share(const Evidence& seen);
+  static bool scattered(const Evidence& seen);
   static void forget_mirrors(Evidence& seen);
-  static Verification conclude(Evidence& seen);
+  static Verification conclude(const TrackedPattern& print, Evidence& seen);
 
   std::span<const TrackedPattern> patterns_;
   bool known_camera_;

@@ -278,6 +278,45 @@ TEST(Prints, APoseBesideThePatternHasSlippedUnlessSomethingCoversIt) {
   EXPECT_TRUE(verifier.has_slipped(0, see(plain), track));
 }
 
+// As regular prints agree with each other: here and there, and roughly. What covers a print leaves
+// whole parts of it as they are.
+TEST(Prints, OneThatAgreesHereAndThereIsNotShown) {
+  const auto pattern = tracker::view_tracked_pattern(record(), 0);
+  ASSERT_TRUE(pattern) << to_line(pattern.error());
+  const Camera camera = default_camera(kWidth, kHeight);
+  const auto extractor = FeatureExtractor::create(kWidth, kHeight, {});
+  tracker::PatchCache patches;
+  tracker::Track track;
+  track.pose = pose_of(look_at(2.8, 10, 20, 10));
+  const auto verify = [&](double own_share, bool strewn) {
+    cv::Mat print = picture().clone();
+    const cv::Mat other = textured_picture(300, 240, 904);
+    for (int cell = 0; cell < 64; ++cell) {
+      const int x = cell % 8;
+      const int y = cell / 8;
+      const bool own = strewn ? (2 * x + y) % 5 < 2 : x < 3;
+      const cv::Rect place = cv::Rect(x * 75 / 2, y * 30, 38, 30) & cv::Rect(0, 0, 300, 240);
+      cv::addWeighted(picture()(place), own ? own_share : 0, other(place), own ? 1 - own_share : 1,
+                      0, print(place));
+    }
+    Random random(5);
+    const SceneFrame scene = render_still(gray(print), camera, track.pose,
+                                          clutter(kWidth, kHeight, 77), {}, random, 0.65, {});
+    extractor->set_frame(scene.picture.view());
+    tracker::PrintVerifier verifier(std::span(&*pattern, 1));
+    return verifier.verify_found(0, {camera, extractor->pyramid(), tracker::kernels(), patches},
+                                 track, false);
+  };
+  constexpr double kRough = 0.47;
+  const auto rough = verify(kRough, true);
+  EXPECT_EQ(rough.reason, Reason::kFailedVerification) << rough.agreeing << " " << rough.likeness;
+  const auto strewn = verify(1, true);
+  EXPECT_EQ(strewn.reason, Reason::kVisible) << strewn.agreeing;
+  const auto whole = verify(1, false);
+  EXPECT_EQ(whole.reason, Reason::kVisible) << whole.agreeing;
+  EXPECT_LT(whole.agreeing, 0.5);
+}
+
 TEST(Prints, APoseThatItsPatchesContradictIsNotShown) {
   const auto loop = loop_on(alone());
   Sequence before(gray(picture()));
