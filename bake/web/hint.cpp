@@ -15,7 +15,7 @@ namespace modar {
 namespace {
 
 constexpr std::uint32_t kMostSide = 512;       ///< pixels: what a cover shows of it
-constexpr std::size_t kMostBytes = 45 * 1000;  ///< 0.25 s at 1.6 Mbit/s
+constexpr std::size_t kMostBytes = 24 * 1000;  ///< 0.12 s at 1.6 Mbit/s
 
 RgbaImage gray_picture(const TrackerRecordView& record) {
   RgbaImage image{record.header.width, record.header.height, {}};

@@ -10,7 +10,7 @@
 
 namespace modar {
 
-/// A JPEG file of at most 512 pixels a side and about 45 KB: the gray picture that the tracker
+/// A JPEG file of at most 512 pixels a side and about 24 KB: the gray picture that the tracker
 /// looks for, in the colours of its cells (SectionType::kPatternColours) where the bundle has them.
 /// width, height: of the tracker's picture. Errors: kInvalidInput "web.pattern".
 struct Hint {
