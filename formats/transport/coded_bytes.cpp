@@ -1,6 +1,7 @@
 #include "formats/transport/coded_bytes.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "formats/transport/context_coder.hpp"
 
@@ -286,16 +287,47 @@ std::vector<std::byte> encode_picture(std::span<const std::uint8_t> pixels, std:
   return coder.finish();
 }
 
+struct PictureDecoder::State {
+  State(std::span<const std::byte> coded, std::uint32_t width)
+      : coder(kPictureSets, coded), model(coder, width) {}
+  ContextCoder coder;
+  PictureModel model;
+};
+
+PictureDecoder::PictureDecoder(std::span<const std::byte> coded, std::uint32_t width,
+                               std::uint32_t height)
+    : coded_(coded), width_(width), pixels_(std::size_t{width} * height) {}
+PictureDecoder::PictureDecoder(PictureDecoder&&) noexcept = default;
+PictureDecoder& PictureDecoder::operator=(PictureDecoder&&) noexcept = default;
+PictureDecoder::~PictureDecoder() = default;
+
+void PictureDecoder::go_on(std::size_t there) {
+  const bool all = there >= coded_.size();
+  // 16 bits a pixel: twice what noise takes.
+  const std::size_t room = std::size_t{2} * width_;
+  while (done_ < pixels_.size()) {
+    if (!all && (state_ == nullptr ? 4 : state_->coder.read()) + room > there) return;
+    if (state_ == nullptr) state_ = std::make_unique<State>(coded_, width_);
+    state_->model.code_row(std::span(pixels_).subspan(done_, width_));
+    done_ += width_;
+    if (all && state_->coder.overrun()) return;
+    if (all || state_->coder.read() <= there) continue;
+    // The row took more still, of bytes that are not there: from the start, when more are.
+    state_.reset();
+    done_ = 0;
+    return;
+  }
+}
+
+std::optional<std::vector<std::uint8_t>> PictureDecoder::finish() {
+  go_on(coded_.size());
+  if (done_ < pixels_.size() || (state_ != nullptr && state_->coder.overrun())) return std::nullopt;
+  return std::move(pixels_);
+}
+
 std::optional<std::vector<std::uint8_t>> decode_picture(std::span<const std::byte> coded,
                                                         std::uint32_t width, std::uint32_t height) {
-  ContextCoder coder(kPictureSets, coded);
-  PictureModel model(coder, width);
-  std::vector<std::uint8_t> pixels(std::size_t{width} * height);
-  for (std::uint32_t y = 0; y < height; ++y) {
-    model.code_row(std::span(pixels).subspan(std::size_t{y} * width, width));
-    if (coder.overrun()) return std::nullopt;
-  }
-  return pixels;
+  return PictureDecoder(coded, width, height).finish();
 }
 
 }  // namespace modar

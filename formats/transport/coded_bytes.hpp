@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -24,5 +25,28 @@ std::optional<std::vector<std::byte>> decode_bytes(std::span<const std::byte> co
 std::vector<std::byte> encode_picture(std::span<const std::uint8_t> pixels, std::uint32_t width);
 std::optional<std::vector<std::uint8_t>> decode_picture(std::span<const std::byte> coded,
                                                         std::uint32_t width, std::uint32_t height);
+
+/// decode_picture() while the coded bytes come: on a slow line nothing is left to do when the last
+/// one is there.
+class PictureDecoder {
+ public:
+  /// coded: memory for all of the bytes, which outlives this.
+  PictureDecoder(std::span<const std::byte> coded, std::uint32_t width, std::uint32_t height);
+  PictureDecoder(PictureDecoder&&) noexcept;
+  PictureDecoder& operator=(PictureDecoder&&) noexcept;
+  ~PictureDecoder();
+  /// Decodes the rows for which the first `there` bytes suffice.
+  void go_on(std::size_t there);
+  /// All bytes are there. Nothing where they end too early.
+  std::optional<std::vector<std::uint8_t>> finish();
+
+ private:
+  struct State;
+  std::span<const std::byte> coded_;
+  std::uint32_t width_ = 0;
+  std::unique_ptr<State> state_;
+  std::vector<std::uint8_t> pixels_;
+  std::size_t done_ = 0;  ///< pixels
+};
 
 }  // namespace modar

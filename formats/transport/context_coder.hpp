@@ -29,6 +29,8 @@ class ContextCoder {
   bool code(bool decision, std::uint32_t node, std::size_t first, std::size_t second);
 
   [[nodiscard]] bool decodes() const { return decodes_; }
+  /// Coded bytes that decisions so far depend on.
+  [[nodiscard]] std::size_t read() const { return read_; }
   /// More was decoded than the bytes hold.
   [[nodiscard]] bool overrun() const { return read_ > coded_.size() + 4; }
   /// The encoded bytes; nothing may be coded after.

@@ -8,7 +8,6 @@
 #include "formats/bundle_view.hpp"
 #include "formats/transport/coded_bytes.hpp"
 #include "formats/transport/stages.hpp"
-#include "modar/packed_record.hpp"
 
 namespace modar {
 namespace {
@@ -16,12 +15,12 @@ namespace {
 constexpr const char* kCure = "fetch it again, or make the packed bundle again";
 
 Result<std::vector<std::byte>> own_bytes(const PieceRecord& piece,
-                                         std::span<const std::byte> stored) {
+                                         std::span<const std::byte> stored, RecordUnpacker* begun) {
   switch (static_cast<PieceForm>(piece.form)) {
     case PieceForm::kStored:
       return std::vector<std::byte>(stored.begin(), stored.end());
     case PieceForm::kTrackerRecord:
-      return unpack_tracker_record(stored);
+      return begun != nullptr ? begun->finish() : unpack_tracker_record(stored);
     case PieceForm::kCoded: {
       auto raw = decode_bytes(stored, piece.raw_size, std::max<std::uint32_t>(piece.index_base, 1));
       if (raw) return *std::move(raw);
@@ -55,8 +54,9 @@ std::byte* zeros(std::size_t size) {
 }  // namespace
 
 Result<std::vector<std::byte>> decode_own_piece(const PieceRecord& piece,
-                                                std::span<const std::byte> stored) {
-  MODAR_ASSIGN(auto raw, own_bytes(piece, stored));
+                                                std::span<const std::byte> stored,
+                                                RecordUnpacker* begun) {
+  MODAR_ASSIGN(auto raw, own_bytes(piece, stored, begun));
   if (raw.size() != piece.raw_size || raw_hash(raw) != piece.raw_hash) {
     return fail(ExitCode::kInvalidInput, "piece.hash", "piece",
                 "it decodes to different bytes than were published", kCure);

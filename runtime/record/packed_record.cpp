@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "formats/transport/coded_bytes.hpp"
 #include "runtime/record/record_parts.hpp"
 
 namespace modar {
@@ -280,6 +279,20 @@ bool good_side(int side) {
   return side >= kSmallestSide && side <= kLargestSide;
 }
 
+/// packed: as long as the whole, of which the header is there.
+Result<PackedHeader> header_of(std::span<const std::byte> packed) {
+  PackedHeader header{};
+  if (packed.size() < sizeof header) return broken("it ends in its header");
+  std::memcpy(&header, packed.data(), sizeof header);
+  if (header.version != kPackedVersion) return broken("its version is unknown");
+  if (!good_side(header.width) || !good_side(header.height)) {
+    return broken("a side is not 32 to 1023 pixels");
+  }
+  if (header.feature_count > kMaxTrackerFeatures) return broken("it has too many features");
+  if (header.picture_size > packed.size() - sizeof header) return broken("it ends in its picture");
+  return header;
+}
+
 }  // namespace
 
 std::optional<std::vector<std::byte>> pack_tracker_record(std::span<const std::byte> record) {
@@ -313,26 +326,33 @@ std::optional<std::vector<std::byte>> pack_tracker_record(std::span<const std::b
   return packed;
 }
 
-Result<std::vector<std::byte>> unpack_tracker_record(std::span<const std::byte> packed) {
-  PackedHeader header{};
-  if (packed.size() < sizeof header) return broken("it ends in its header");
-  std::memcpy(&header, packed.data(), sizeof header);
-  if (header.version != kPackedVersion) return broken("its version is unknown");
-  if (!good_side(header.width) || !good_side(header.height)) {
-    return broken("a side is not 32 to 1023 pixels");
+void RecordUnpacker::go_on(std::size_t there) {
+  if (there < sizeof(PackedHeader)) return;
+  if (!picture_) {
+    const auto header = header_of(packed_);
+    if (!header) return;  // finish() tells
+    picture_.emplace(packed_.subspan(sizeof *header, header->picture_size), header->width,
+                     header->height);
   }
-  if (header.feature_count > kMaxTrackerFeatures) return broken("it has too many features");
-  packed = packed.subspan(sizeof header);
-  if (header.picture_size > packed.size()) return broken("it ends in its picture");
-  auto pixels = decode_picture(packed.first(header.picture_size), header.width, header.height);
+  picture_->go_on(there - sizeof(PackedHeader));
+}
+
+Result<std::vector<std::byte>> RecordUnpacker::finish() {
+  MODAR_ASSIGN(const PackedHeader header, header_of(packed_));
+  go_on(packed_.size());
+  auto pixels = picture_->finish();
   if (!pixels) return broken("its picture ends too early");
   const std::vector<ViewLevel> levels =
       view_levels({pixels->data(), header.width, header.height, header.width});
-  BitString bits(packed.subspan(header.picture_size));
+  BitString bits(packed_.subspan(sizeof header + header.picture_size));
   MODAR_ASSIGN(const auto features, read_features(header, levels, bits));
   MODAR_ASSIGN(const auto patches, read_patches(header, levels, bits));
   if (!bits.used_up()) return broken("it holds more than it says");
   return assemble_record({levels.begin(), levels.end()}, features, patches);
+}
+
+Result<std::vector<std::byte>> unpack_tracker_record(std::span<const std::byte> packed) {
+  return RecordUnpacker(packed).finish();
 }
 
 }  // namespace modar

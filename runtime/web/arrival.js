@@ -7,10 +7,29 @@ const WAIT_S = 1;
 /** As formats/transport/recipe.hpp has them. */
 const MAGIC = [0x89, 0x4d, 0x4f, 0x52, 0x0d, 0x0a, 0x1a, 0x0a];
 const RECIPE_BYTES = 64, PIECE_BYTES = 64, MOST_PIECES = 1 << 20;
+/** A form, there: a packed tracker record, most of a first stage, which is unpacked while it comes. */
+const PACKED_RECORD = 7;
+/**
+ * Bytes that are asked for first and alone. On a slow line the engine comes at the same time: the rest of the first stage is asked for
+ * when these are there, arrives when the engine runs, and is unpacked as fast as it comes. Set by hand.
+ */
+const START = 40 << 10;
 /** What pieces are needed for: to find patterns, to show each model as coarse as there is, all else. */
 export const STAGE = { find: 1, show: 2, refine: 3 };
 
 const pause = (seconds) => new Promise((resolve) => { setTimeout(resolve, 1000 * seconds); });
+
+/** A reader that reads on by itself, and calls back at the end. */
+function eager(reader, onEnd) {
+  const reads = [];
+  const next = () => {
+    const read = reader.read();
+    reads.push(read);
+    read.then(({ done }) => (done ? onEnd : next)(), () => {});
+  };
+  next();
+  return { read: () => reads.shift(), cancel: () => reader.cancel() };
+}
 
 /** A file's bytes from first to last: after a connection that broke, from where it did. */
 export class Source {
@@ -23,8 +42,10 @@ export class Source {
   /** Came, and was not taken. */
   #chunk = new Uint8Array();
   #taken = 0;
-  /** Where an address says so (?first=...): bytes that are asked for alone, since the rest can wait until they are there. */
-  #first = 0;
+  /** Where an address says so (?first=...): ends of bytes that are asked for alone, since the rest can wait until they are there. */
+  #stops = [];
+  /** Of the second stop's bytes, as soon as those of the first one are there: the promise of #open(). */
+  #second = null;
   total = 0;
   /** While it is true, what does not come is waited for. */
   patient = false;
@@ -33,7 +54,8 @@ export class Source {
   constructor(bundle, onProgress) {
     this.#given = typeof bundle !== 'string' && !(bundle instanceof URL);
     this.#bundle = this.#given ? new Uint8Array(bundle) : bundle;
-    this.#first = this.#given ? 0 : Number(/[?&]first=(\d+)/.exec(bundle)?.[1] ?? 0);
+    const first = this.#given ? 0 : Number(/[?&]first=(\d+)/.exec(bundle)?.[1] ?? 0);
+    if (first > 0) this.#stops = [Math.min(START, first), first];
     this.#onProgress = onProgress;
   }
 
@@ -48,13 +70,19 @@ export class Source {
       return { reader: { read: async () => ({ done: true }), cancel: async () => {} }, chunk: this.#bundle.subarray(from) };
     }
     const { signal } = this.#abort;
-    const last = from < this.#first ? this.#first - 1 : '';
-    const headers = from > 0 || last ? { Range: `bytes=${from}-${last}` } : {};
+    const end = this.#stops.find((stop) => stop > from);
+    const headers = from > 0 || end ? { Range: `bytes=${from}-${end ? end - 1 : ''}` } : {};
     const response = await fetch(this.#bundle, { signal, headers, cache: again ? 'no-store' : 'default' })
       .catch(() => { throw this.#failed('the bundle could not be loaded'); });
     if (!response.ok) throw Object.assign(this.#failed(`the server answered ${response.status}`), { final: response.status < 500 });
     this.total ||= from + (Number(response.headers.get('content-length')) || 0);
-    const reader = response.body.getReader();
+    let reader = response.body.getReader();
+    if (response.status === 206 && end === this.#stops[0]) {
+      reader = eager(reader, () => {
+        this.#second = this.#open(end);
+        this.#second.catch(() => {});  // told to #read()
+      });
+    }
     // A host without ranges begins at the first byte.
     for (let skip = response.status === 206 ? 0 : from; skip > 0;) {
       const { done, value } = await reader.read();
@@ -67,7 +95,10 @@ export class Source {
 
   async #read() {
     if (!this.#reader) {
-      const { reader, chunk } = await this.#open(this.#taken, this.#taken > 0 && this.#taken !== this.#first);
+      const again = this.#taken > 0 && !this.#stops.includes(this.#taken);
+      const second = this.#taken === this.#stops[0] && this.#second;
+      this.#second = null;
+      const { reader, chunk } = await (second || this.#open(this.#taken, again));
       this.#reader = reader;
       if (chunk.length) return chunk;
     }
@@ -83,8 +114,11 @@ export class Source {
     await pause(WAIT_S * 2 ** Math.min(tries - 1, 5));
   }
 
-  /** The next bytes, so many or to the end; whole: it is an error where they are fewer. */
-  async take(count, whole = true) {
+  /**
+   * The next bytes, so many or to the end; whole: it is an error where they are fewer. onPart(at, bytes): is told of parts as they
+   * come, where they are more than one.
+   */
+  async take(count, whole = true, onPart = null) {
     const parts = [];
     let size = 0;
     for (let tries = 0; size < count;) {
@@ -93,8 +127,8 @@ export class Source {
         const chunk = await this.#read().catch((cause) => {
           error = cause instanceof ModarError ? cause : this.#failed(`the network broke off after ${this.#taken} bytes`);
         });
-        if (!error && chunk === null && this.#taken === this.#first && this.#taken < this.total) {
-          this.#reader = null;  // now the rest
+        if (!error && chunk === null && this.#stops.includes(this.#taken) && this.#taken < this.total) {
+          this.#reader = null;  // now what follows
           continue;
         }
         if (!error && chunk === null && !whole) break;
@@ -108,6 +142,7 @@ export class Source {
       const part = this.#chunk.subarray(0, count - size);
       this.#chunk = this.#chunk.subarray(part.length);
       parts.push(part);
+      if (onPart && part.length < count) onPart(size, part);
       size += part.length;
       this.#taken += part.length;
       this.#onProgress?.(this.#taken, Math.max(this.total, this.#taken));
@@ -139,7 +174,7 @@ export class Arrival {
   #source;
   /** Calls of a worker that decodes. */
   #decoder;
-  /** Of the recipe: {index, at, stored, offset, size, stage}. */
+  /** Of the recipe: {index, at, stored, offset, size, form, stage}. */
   #pieces = [];
   #next = 0;
   /** Raw, of the first stage: [{offset, bytes}], until a view has taken them. */
@@ -174,7 +209,8 @@ export class Arrival {
     for (let record = RECIPE_BYTES; record < view.byteLength; record += PIECE_BYTES) {
       const stored = view.getUint32(record + 44, true);
       this.#pieces.push({
-        index: this.#pieces.length, at, stored, offset: long(record + 24), size: view.getUint32(record + 40, true), stage: view.getUint8(record + 55),
+        index: this.#pieces.length, at, stored, offset: long(record + 24), size: view.getUint32(record + 40, true),
+        form: view.getUint8(record + 54), stage: view.getUint8(record + 55),
       });
       at += stored;
     }
@@ -200,12 +236,16 @@ export class Arrival {
     take(offset, answer.bytes);
   }
 
+  #begin({ index, stored }, at, part) {
+    this.#decoder.ask({ type: 'begin', index, stored, at, bytes: part.slice() }).catch(() => {});  // #decode() is told
+  }
+
   /** Brings the pieces of a stage; one is decoded while the next one comes. take(offset, bytes) */
   async bring(stage, take) {
     let before;
     for (; this.#pieces[this.#next]?.stage <= stage; ++this.#next) {
       const piece = this.#pieces[this.#next];
-      const bytes = await this.#source.take(piece.stored);
+      const bytes = await this.#source.take(piece.stored, true, piece.form === PACKED_RECORD && ((at, part) => this.#begin(piece, at, part)));
       await before;
       before = this.#decode(piece, bytes, take);
       before.catch(() => {});  // told below

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -44,6 +45,13 @@ struct OwnPattern {
   uint32_t scene = 0;
 };
 
+/// A tracker record that is unpacked while it comes.
+struct Begun {
+  uint32_t index;
+  const void* stored;
+  modar::RecordUnpacker unpacker;
+};
+
 struct Engine {
   modar_error error = modar::sized<modar_error>();
   modar_bundle* bundle = nullptr;
@@ -62,6 +70,7 @@ struct Engine {
   std::unique_ptr<modar::ArrivingBundle> arriving;  ///< of web_arrive()
   modar::RecipeView recipe;                         ///< of web_recipe()
   std::vector<std::byte> piece;                     ///< raw, of web_piece()
+  std::optional<Begun> begun;                       ///< of web_begin_piece()
   char text[4096];
 };
 Engine engine;
@@ -128,6 +137,12 @@ int failed(const modar::Error& error) {
   return engine.error.status = static_cast<int>(error.exit);
 }
 
+/// What was begun of a piece in this memory; null where nothing was.
+modar::RecordUnpacker* begun_of(uint32_t index, const void* stored) {
+  const bool same = engine.begun && engine.begun->index == index && engine.begun->stored == stored;
+  return same ? &engine.begun->unpacker : nullptr;
+}
+
 /// A canvas that a frame of web_camera() covers.
 modar_surface surface_of(int width, int height, int mirror) {
   auto surface = modar::sized<modar_surface>();
@@ -173,12 +188,23 @@ EMSCRIPTEN_KEEPALIVE int web_recipe(const void* bytes, size_t size) {
   engine.recipe = *recipe;
   return 0;
 }
+/// Unpacks the first `there` bytes of a piece that is a tracker record. stored: memory for all of
+/// it, where web_piece() finds it.
+EMSCRIPTEN_KEEPALIVE void web_begin_piece(uint32_t index, const void* stored, size_t there) {
+  if (begun_of(index, stored) == nullptr) {
+    const auto* const bytes = static_cast<const std::byte*>(stored);
+    const size_t size = engine.recipe.pieces[index].stored_size;
+    engine.begun.emplace(Begun{index, stored, modar::RecordUnpacker({bytes, size})});
+  }
+  engine.begun->unpacker.go_on(there);
+}
 /// The raw bytes of a piece of the recipe, until the next one; null for one that is damaged.
 /// stored: as long as the recipe says.
 EMSCRIPTEN_KEEPALIVE const void* web_piece(uint32_t index, const void* stored) {
   const modar::PieceRecord& piece = engine.recipe.pieces[index];
-  auto raw =
-      modar::decode_own_piece(piece, {static_cast<const std::byte*>(stored), piece.stored_size});
+  auto raw = modar::decode_own_piece(
+      piece, {static_cast<const std::byte*>(stored), piece.stored_size}, begun_of(index, stored));
+  engine.begun.reset();
   if (!raw) {
     failed(raw.error());
     return nullptr;

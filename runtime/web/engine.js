@@ -121,6 +121,12 @@ export class Engine {
     this.#check(this.#module._web_recipe(at, bytes.length));
   }
 
+  /** Some of a tracker record's `stored` bytes have come: decode() has less to do. */
+  begin(index, stored, at, bytes) {
+    this.frameBuffer(stored).set(bytes, at);
+    this.#module._web_begin_piece(index, this.frameAt, at + bytes.length);
+  }
+
   /** The raw bytes of a piece, verified. */
   decode(index, stored, size) {
     this.frameBuffer(stored.length).set(stored);

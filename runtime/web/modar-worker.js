@@ -93,6 +93,10 @@ const answers = {
     engine.recipe(bytes);
     return { type: 'ready' };
   },
+  begin({ index, stored, at, bytes }) {
+    engine.begin(index, stored, at, bytes);
+    return { type: 'begun' };
+  },
   piece({ index, stored, size }) {
     return { type: 'decoded', bytes: engine.decode(index, stored, size) };
   },

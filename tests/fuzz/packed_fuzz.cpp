@@ -65,6 +65,11 @@ void read_rehashed(std::vector<std::byte> bytes) {
 
 void read_record(std::span<const std::byte> bytes) {
   const auto record = unpack_tracker_record(bytes);
+  RecordUnpacker begun(bytes);
+  for (std::size_t there = 0; there < bytes.size(); there += 1 + bytes.size() / 3)
+    begun.go_on(there);
+  const auto same = begun.finish();
+  need(same.has_value() == record.has_value() && (!same || *same == *record));
   if (!record) return test::need_told(record.error());
   TrackerRecordView view;
   need(!view_tracker_record(*record, view));

@@ -111,6 +111,40 @@ TEST(CodedPicture, ComesBackAndIsSmallerThanItsNoise) {
   EXPECT_LT(bits, 1.25 * std::log2(3.0));
 }
 
+TEST(CodedPicture, ComesBackWhileItComes) {
+  std::mt19937 random(11);
+  GrayPicture noise{150, 90, {}};
+  for (int i = 0; i < 150 * 90; ++i) noise.pixels.push_back(static_cast<std::uint8_t>(random()));
+  // Of a flat picture with a row of black and white, which no row before foretells: 16 bits a pixel
+  // do not hold it.
+  GrayPicture flat{150, 90, std::vector<std::uint8_t>(150 * 90, 77)};
+  for (std::size_t x = 0; x < 150; ++x) flat.pixels[150 * 60 + x] = x % 2 == 0 ? 0 : 255;
+  for (const GrayPicture& picture : {discs(200, 150), noise, flat}) {
+    const auto width = static_cast<std::uint32_t>(picture.width);
+    const Bytes coded = encode_picture(picture.pixels, width);
+    Bytes memory(coded.size(), std::byte{0xA5});  // what is not there must not be looked at
+    PictureDecoder decoder(memory, width, static_cast<std::uint32_t>(picture.height));
+    for (std::size_t there = 0; there < coded.size(); there += 1 + random() % (coded.size() / 7)) {
+      std::copy_n(coded.begin(), there, memory.begin());
+      decoder.go_on(there);
+    }
+    std::copy(coded.begin(), coded.end(), memory.begin());
+    EXPECT_EQ(decoder.finish(), picture.pixels);
+  }
+}
+
+TEST(PackedRecord, ComesBackWhileItComes) {
+  const Bytes packed = pack_tracker_record(small_record()).value();
+  Bytes memory(packed.size());
+  RecordUnpacker unpacker(memory);
+  for (std::size_t there = 0; there < packed.size(); there += 1000) {
+    std::copy_n(packed.begin(), there, memory.begin());
+    unpacker.go_on(there);
+  }
+  memory = packed;
+  EXPECT_EQ(unpacker.finish().value(), small_record());
+}
+
 TEST(PackedRecord, ComesBackByteForByte) {
   const Bytes& record = small_record();
   const auto packed = pack_tracker_record(record);

@@ -11,13 +11,16 @@
 
 #include "formats/base/error.hpp"
 #include "formats/transport/recipe.hpp"
+#include "modar/packed_record.hpp"
 
 namespace modar {
 
 /// Raw bytes of a piece whose form needs no library: kStored, kTrackerRecord, kCoded. Verified.
+/// begun: of a kTrackerRecord, what was unpacked of these bytes while they came, or null.
 /// Errors: kInvalidInput "piece.*", "record.packed"; kUnsupported "piece.form".
 Result<std::vector<std::byte>> decode_own_piece(const PieceRecord& piece,
-                                                std::span<const std::byte> stored);
+                                                std::span<const std::byte> stored,
+                                                RecordUnpacker* begun = nullptr);
 
 /// Bytes of the recipe at the start of a packed bundle; start: its first sizeof(RecipeHeader)
 /// bytes. Errors: kInvalidInput "recipe.magic", "recipe.header"; kUnsupported "recipe.version".

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "formats/base/error.hpp"
+#include "formats/transport/coded_bytes.hpp"
 
 namespace modar {
 
@@ -19,5 +20,20 @@ std::optional<std::vector<std::byte>> pack_tracker_record(std::span<const std::b
 /// The record's bytes, the same on every processor. Takes 0.25 s for a picture of 348 x 717 pixels
 /// on a workstation of 2020. Errors: kInvalidInput "record.packed".
 Result<std::vector<std::byte>> unpack_tracker_record(std::span<const std::byte> packed);
+
+/// unpack_tracker_record() while the bytes come.
+class RecordUnpacker {
+ public:
+  /// packed: memory for all of the bytes, which outlives this.
+  explicit RecordUnpacker(std::span<const std::byte> packed) : packed_(packed) {}
+  /// Decodes what the first `there` bytes hold of the picture.
+  void go_on(std::size_t there);
+  /// All bytes are there. Errors: as of unpack_tracker_record().
+  Result<std::vector<std::byte>> finish();
+
+ private:
+  std::span<const std::byte> packed_;
+  std::optional<PictureDecoder> picture_;
+};
 
 }  // namespace modar
