@@ -116,10 +116,10 @@ export class Source {
 
   /**
    * The next bytes, so many or to the end; whole: it is an error where they are fewer. onPart(at, bytes): is told of parts as they
-   * come, where they are more than one.
+   * come, where they are more than one. before: what was taken of them already.
    */
-  async take(count, whole = true, onPart = null) {
-    const parts = [];
+  async take(count, whole = true, onPart = null, before = []) {
+    const parts = [...before];
     let size = 0;
     for (let tries = 0; size < count;) {
       if (this.#chunk.length === 0) {

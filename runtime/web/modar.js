@@ -226,7 +226,7 @@ export class Modar extends EventTarget {
         await modar.arrival.begin(start);
         opening = [{ size: modar.arrival.size, found: modar.arrival.found }];
       } else {
-        modar.bytes = new Uint8Array(await new Blob([start, await source.take(Infinity, false)]).arrayBuffer());
+        modar.bytes = await source.take(Infinity, false, null, [start]);
         const copy = modar.bytes.slice().buffer;
         opening = [{ bytes: copy }, [copy]];
         source.close();
