@@ -40,12 +40,19 @@ struct Gesture {
   float y = 0;
 };
 
+/// A picture of the visitor's own, after the bundle's patterns.
+struct Own {
+  std::unique_ptr<modar_record, decltype(&modar_record_close)> record;
+  std::uint32_t scene = 0;  ///< what stands on it
+};
+
 /// A bundle with what was made of it. The camera's thread tracks while GL's thread draws.
 struct Session {
   std::mutex tracking;  ///< holds tracker
   std::mutex drawing;   ///< holds renderer, surfaces, actions, events, items, gesture
   // Both guards to write, either to read:
-  modar_bundle* bundle = nullptr;                      ///< null once it is closed
+  modar_bundle* bundle = nullptr;  ///< null once it is closed
+  std::vector<Own> own;
   modar_camera camera = modar::sized<modar_camera>();  ///< width 0: not known yet
   modar_tracker* tracker = nullptr;
   modar_renderer* renderer = nullptr;
@@ -60,6 +67,11 @@ struct Session {
   bool alone = true;           ///< nothing but the renderer draws in GLSurfaceView's context
   std::vector<float> poses;    ///< on which these stand, as org.modar.Poses has them
   Gesture gesture;
+
+  /// The bundle's patterns, then the visitor's own.
+  [[nodiscard]] std::uint32_t patterns() const {
+    return modar_pattern_count(bundle) + static_cast<std::uint32_t>(own.size());
+  }
 };
 
 /// Java holds numbers that are never given twice: a closed one is found nowhere.
@@ -202,7 +214,7 @@ void* direct(JNIEnv* env, jobject buffer, std::size_t size, const char* what) {
 }
 
 float* pose_floats(JNIEnv* env, const Session& session, jobject buffer) {
-  const std::size_t size = modar_pattern_count(session.bundle) * kPoseFloats * sizeof(float);
+  const std::size_t size = session.patterns() * kPoseFloats * sizeof(float);
   auto* floats = static_cast<float*>(direct(env, buffer, size, "poses"));
   if (reinterpret_cast<std::uintptr_t>(floats) % alignof(float) == 0) return floats;
   misuse(env, "android.buffer", "poses", "it is not aligned", "use the whole of a direct buffer");
@@ -287,7 +299,7 @@ jint track(JNIEnv* env, Session& session, const std::uint8_t* luma, std::size_t 
     modar_tracker_camera(session.tracker, &session.camera);
   }
   jint visible = 0;
-  const std::uint32_t patterns = modar_pattern_count(session.bundle);
+  const std::uint32_t patterns = session.patterns();
   for (std::uint32_t i = 0; i < patterns; ++i, poses += kPoseFloats) {
     auto pose = modar::sized<modar_pose>();
     visible += modar_tracker_pose(session.tracker, i, &pose);
@@ -353,20 +365,40 @@ modar_pose pose_of(const float* view) {
   return pose;
 }
 
+/// What stands on a pattern, into items; answers how many there are. The visitor's own pictures
+/// have a scene of the bundle's each.
+std::size_t items_on(const Session& session, std::uint32_t pattern, modar_item* items,
+                     std::size_t capacity) {
+  constexpr float kStill[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  const std::uint32_t baked = modar_pattern_count(session.bundle);
+  if (pattern < baked) {
+    return modar_actions_items(session.actions, pattern, kStill, items, capacity);
+  }
+  auto scene = modar::sized<modar_scene>();
+  if (capacity == 0 ||
+      modar_scene_at(session.bundle, session.own[pattern - baked].scene, &scene) == 0) {
+    return 0;
+  }
+  *items = modar::sized<modar_item>();
+  items->model = scene.model;
+  items->scene = scene.number;
+  std::memcpy(items->to_eye, scene.place, sizeof scene.place);
+  return 1;
+}
+
 /// What stands on the patterns that are shown. Gestures move models; pictures belong to their
 /// patterns.
 void place_items(Session& session, const float* poses) {
-  constexpr float kStill[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   session.item_count = 0;
-  session.poses.assign(poses, poses + modar_pattern_count(session.bundle) * kPoseFloats);
+  session.poses.assign(poses, poses + session.patterns() * kPoseFloats);
   const Gesture& gesture = session.gesture;
   const bool moved = gesture.scale != 1 || gesture.turn != 0 || gesture.x != 0 || gesture.y != 0;
-  for (std::uint32_t p = 0; p < modar_pattern_count(session.bundle); ++p) {
+  for (std::uint32_t p = 0; p < session.patterns(); ++p) {
     const float* from = poses + p * kPoseFloats;
     if (from[1] == 0) continue;
     modar_item* items = session.items.data() + session.item_count;
-    const std::size_t count = modar_actions_items(session.actions, p, kStill, items,
-                                                  session.items.size() - session.item_count);
+    const std::size_t count =
+        items_on(session, p, items, session.items.size() - session.item_count);
     const modar_pose pose = pose_of(from + kView);
     for (std::size_t i = 0; i < count; ++i) {
       auto scene = modar::sized<modar_scene>();
@@ -402,7 +434,7 @@ void draw_orbit(Session& session, std::uint32_t pattern, double turn, double til
   camera.height = surface.height;
   auto pose = modar::sized<modar_pose>();
   if (modar_orbit(session.bundle, pattern, turn, tilt, zoom, &camera, &pose) == 0) return;
-  std::vector<float> poses(modar_pattern_count(session.bundle) * kPoseFloats, 0.0f);
+  std::vector<float> poses(session.patterns() * kPoseFloats, 0.0f);
   poses[pattern * kPoseFloats + 1] = 1;
   modar_view(&pose, poses.data() + pattern * kPoseFloats + kView);
   const Gesture before = std::exchange(session.gesture, {});  // of the camera's view
@@ -508,7 +540,7 @@ MODAR_NATIVE(void, verify)(JNIEnv* env, jclass, jlong number) {
 
 MODAR_NATIVE(jint, patternCount)(JNIEnv* env, jclass, jlong number) {
   const Use session(env, number, &Session::tracking);
-  return session ? static_cast<jint>(modar_pattern_count(session->bundle)) : 0;
+  return session ? static_cast<jint>(session->patterns()) : 0;
 }
 
 MODAR_NATIVE(jstring, patternName)(JNIEnv* env, jclass, jlong number, jint index) {
@@ -572,8 +604,49 @@ MODAR_NATIVE(void, setCamera)
   modar_tracker* tracker = modar_tracker_create_with(session->bundle, &camera, &options, &error);
   if (tracker == nullptr) return throw_error(env, error);
   modar_tracker_destroy(std::exchange(session->tracker, tracker));
+  for (const Own& own : session->own) {
+    if (modar_tracker_add_pattern(tracker, own.record.get(), nullptr, &error) != 0) {
+      return throw_error(env, error);
+    }
+  }
   const std::lock_guard drawing(session->drawing);
   session->camera = camera;
+}
+
+MODAR_NATIVE(void, addPattern)
+(JNIEnv* env, jclass, jlong number, jbyteArray bytes, jint scene) {
+  const Use session(env, number, &Session::tracking);
+  if (!session) return;
+  const ArrayBytes record(env, bytes, 1);
+  if (record.get() == nullptr) return;
+  auto error = modar::sized<modar_error>();
+  auto asked = modar::sized<modar_scene>();
+  if (scene < 0 ||
+      modar_scene_at(session->bundle, static_cast<std::uint32_t>(scene), &asked) == 0) {
+    return misuse(env, "android.index", "scene", "the bundle has nothing of that number",
+                  "count first");
+  }
+  Own own{{modar_record_open(record.get(), static_cast<std::size_t>(env->GetArrayLength(bytes)),
+                             &error),
+           modar_record_close},
+          static_cast<std::uint32_t>(scene)};
+  if (own.record == nullptr) return throw_error(env, error);
+  const std::lock_guard drawing(session->drawing);
+  // Made anew by setCamera(), with this one.
+  modar_tracker_destroy(std::exchange(session->tracker, nullptr));
+  session->camera = modar::sized<modar_camera>();
+  session->own.push_back(std::move(own));
+  session->items.emplace_back(modar::sized<modar_item>());
+}
+
+MODAR_NATIVE(jint, sceneModel)(JNIEnv* env, jclass, jlong number, jint index) {
+  const Use session(env, number, &Session::tracking);
+  auto scene = modar::sized<modar_scene>();
+  if (!session || index < 0 ||
+      modar_scene_at(session->bundle, static_cast<std::uint32_t>(index), &scene) == 0) {
+    return -1;
+  }
+  return static_cast<jint>(scene.model);
 }
 
 MODAR_NATIVE(jdouble, focal)(JNIEnv* env, jclass, jlong number) {

@@ -6,6 +6,7 @@
 
 #include "formats/tracker_record.hpp"
 #include "modar/pattern_record.hpp"
+#include "modar/photo.hpp"
 #include "runtime/capi/handles.hpp"
 
 using modar::hand_over;
@@ -87,4 +88,33 @@ modar_record* modar_record_open(const void* bytes, size_t size, modar_error* err
 
 void modar_record_close(modar_record* record) {
   delete record;
+}
+
+int modar_photo_corners(const uint8_t* rgba, int width, int height, float corners[8]) {
+  if (corners == nullptr) return 0;
+  const auto found = modar::photo_corners({rgba, width, height});
+  if (!found) return 0;
+  for (std::size_t i = 0; i < found->size(); ++i) {
+    corners[2 * i] = static_cast<float>((*found)[i].x);
+    corners[2 * i + 1] = static_cast<float>((*found)[i].y);
+  }
+  return 1;
+}
+
+int modar_photo_flat(const uint8_t* rgba, int width, int height, const float corners[8],
+                     uint8_t* gray, int* flat_width, int* flat_height) {
+  if (corners == nullptr || gray == nullptr || flat_width == nullptr || flat_height == nullptr) {
+    return 0;
+  }
+  static_assert(MODAR_FLAT_SIDE == modar::kFlatSide);
+  modar::PhotoCorners points;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    points[i] = glm::dvec2(double{corners[2 * i]}, double{corners[2 * i + 1]});
+  }
+  const auto flat = modar::photo_flat({rgba, width, height}, points);
+  if (!flat) return 0;
+  std::memcpy(gray, flat->pixels.data(), flat->pixels.size());
+  *flat_width = flat->width;
+  *flat_height = flat->height;
+  return 1;
 }

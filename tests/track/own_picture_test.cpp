@@ -2,6 +2,9 @@
 // baked.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cstdlib>
 #include <cstring>
 
 #include "bake/pattern/pattern.hpp"
@@ -100,6 +103,95 @@ TEST(OwnPicture, BytesThatAreDamagedAreRefused) {
   EXPECT_EQ(size, 0u);
   modar_record_close(nullptr);
   EXPECT_EQ(modar_tracker_add_pattern(nullptr, nullptr, nullptr, &error), MODAR_USAGE);
+}
+
+/// A photo of a picture on a green table, which its corners say.
+std::vector<std::uint8_t> photo_of(const cv::Mat& print, const double (&corners)[8], int width,
+                                   int height) {
+  // Where a pixel lies on the picture is solved by Newton's method, which has nothing in common
+  // with what is tested.
+  std::vector<std::uint8_t> rgba;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      double u = 0.5;
+      double v = 0.5;
+      const auto place = [&](double across, double down) {
+        // A plane in perspective; the fourth corner follows.
+        const double w = 1 + 0.2 * across + 0.1 * down;
+        return std::array<double, 2>{(corners[0] + (1.2 * corners[2] - corners[0]) * across +
+                                      (1.1 * corners[6] - corners[0]) * down) /
+                                         w,
+                                     (corners[1] + (1.2 * corners[3] - corners[1]) * across +
+                                      (1.1 * corners[7] - corners[1]) * down) /
+                                         w};
+      };
+      for (int step = 0; step < 12; ++step) {
+        const auto at = place(u, v);
+        const auto right = place(u + 1e-6, v);
+        const auto below = place(u, v + 1e-6);
+        const double xu = (right[0] - at[0]) / 1e-6;
+        const double yu = (right[1] - at[1]) / 1e-6;
+        const double xv = (below[0] - at[0]) / 1e-6;
+        const double yv = (below[1] - at[1]) / 1e-6;
+        const double dx = x + 0.5 - at[0];
+        const double dy = y + 0.5 - at[1];
+        u += (yv * dx - xv * dy) / (xu * yv - xv * yu);
+        v += (xu * dy - yu * dx) / (xu * yv - xv * yu);
+      }
+      const bool inside = u >= 0 && u < 1 && v >= 0 && v < 1;
+      const int column = inside ? static_cast<int>(u * print.cols) : 0;
+      const int row = inside ? static_cast<int>(v * print.rows) : 0;
+      const int value = inside ? print.at<std::uint8_t>(row, column) : 0;
+      // The table is green: no gray is like it.
+      for (const int channel : {value, inside ? value : 160, value, 255}) {
+        rgba.push_back(static_cast<std::uint8_t>(channel));
+      }
+    }
+  }
+  return rgba;
+}
+
+TEST(OwnPicture, IsCutOutOfAPhoto) {
+  const cv::Mat print = textured_picture(300, 240, 77);
+  constexpr int kPhotoWidth = 640;
+  constexpr int kPhotoHeight = 480;
+  constexpr double kTrue[8] = {120, 90, 520, 60, 0, 0, 150, 400};
+  const std::vector<std::uint8_t> photo = photo_of(print, kTrue, kPhotoWidth, kPhotoHeight);
+  // The fourth corner, by the matrix that photo_of() uses.
+  const double far_x = (kTrue[0] + 1.2 * kTrue[2] - kTrue[0] + 1.1 * kTrue[6] - kTrue[0]) / 1.3;
+  const double far_y = (kTrue[1] + 1.2 * kTrue[3] - kTrue[1] + 1.1 * kTrue[7] - kTrue[1]) / 1.3;
+  const double wanted[8] = {120, 90, 520, 60, far_x, far_y, 150, 400};
+  float corners[8] = {};
+  ASSERT_EQ(modar_photo_corners(photo.data(), kPhotoWidth, kPhotoHeight, corners), 1);
+  for (int i = 0; i < 8; ++i) EXPECT_NEAR(corners[i], wanted[i], 6) << i;
+  for (int i = 0; i < 8; ++i) corners[i] = static_cast<float>(wanted[i]);
+  std::vector<std::uint8_t> flat(std::size_t{MODAR_FLAT_SIDE} * MODAR_FLAT_SIDE);
+  int width = 0;
+  int height = 0;
+  ASSERT_EQ(modar_photo_flat(photo.data(), kPhotoWidth, kPhotoHeight, corners, flat.data(), &width,
+                             &height),
+            1);
+  ASSERT_GT(width, 200);
+  ASSERT_LE(std::max(width, height), int{MODAR_FLAT_SIDE});
+  double off = 0;
+  int compared = 0;
+  for (int y = 5; y < height - 5; ++y) {
+    for (int x = 5; x < width - 5; ++x, ++compared) {
+      const int column = static_cast<int>((x + 0.5) / width * print.cols);
+      const int row = static_cast<int>((y + 0.5) / height * print.rows);
+      off += std::abs(flat[static_cast<std::size_t>(y * width + x)] -
+                      print.at<std::uint8_t>(row, column));
+    }
+  }
+  EXPECT_LT(off / compared, 8.0);  // a picture that is shifted by two pixels is off by 20 and more
+  std::swap(corners[0], corners[2]);  // crossed
+  EXPECT_EQ(modar_photo_flat(photo.data(), kPhotoWidth, kPhotoHeight, corners, flat.data(), &width,
+                             &height),
+            0);
+  const std::vector<std::uint8_t> table(std::size_t{4} * kPhotoWidth * kPhotoHeight, 90);
+  EXPECT_EQ(modar_photo_corners(table.data(), kPhotoWidth, kPhotoHeight, corners), 0);
+  EXPECT_EQ(modar_photo_corners(table.data(), 1, 1, corners), 0);
+  EXPECT_EQ(modar_photo_corners(nullptr, 640, 480, corners), 0);
 }
 
 }  // namespace

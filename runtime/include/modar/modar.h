@@ -225,6 +225,19 @@ const char* modar_tracker_reason(const modar_tracker* tracker);
 
 /* ---- pictures of one's own ---- */
 
+/* Looks for one flat thing on a plain table in a photo: 8-bit R, G, B and a byte that is not looked
+ * at, in rows without padding, top row first. Returns 1 and its corners clockwise from the top left
+ * as x, y in pixels (the top left pixel's corner is 0, 0), within some pixels: let people mend
+ * them; or 0. */
+MODAR_EXPERIMENTAL int modar_photo_corners(const uint8_t* rgba, int width, int height,
+                                           float corners[8]);
+enum { MODAR_FLAT_SIDE = 512 };
+/* The gray picture between four such corners, as from the front, for modar_record_create(): rows
+ * without padding in `gray`, which takes MODAR_FLAT_SIDE * MODAR_FLAT_SIDE bytes. Returns 1, or 0
+ * and changes nothing where the corners are no convex quadrangle. */
+MODAR_EXPERIMENTAL int modar_photo_flat(const uint8_t* rgba, int width, int height,
+                                        const float corners[8], uint8_t* gray, int* flat_width,
+                                        int* flat_height);
 /* Makes a pattern of a flat picture that its user has taken, as `modar bake` does, to the same
  * bytes: 8-bit gray, top row first, 32 to 1023 pixels a side (modar_shrink() makes it smaller; a
  * longer side of 500 will do). It runs on any thread, and takes 0.4 s of an x86-64 server's time

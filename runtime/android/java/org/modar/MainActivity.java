@@ -49,6 +49,12 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     private static final int CAPTION = 8;
     private static final int MARKS = 9;
     private static final int RECORDING = 10;
+    private static final int PHOTO = 11;
+    private static final int MADE = 12;
+    private static final int CHOSEN_PICTURE = 2;
+
+    private static final int[] MENU = {R.id.menu_go, R.id.menu_take, R.id.menu_choose, R.id.menu_forget, R.id.own_how, R.id.own_use};
+    private static final String[] MENU_WORDS = {"menu-go", "menu-take", "menu-choose", "menu-forget", "own-how", "own-use"};
 
     private final Handler main = new Handler(Looper.getMainLooper(), this);
     private Diagnostics diagnostics;
@@ -68,7 +74,16 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     private List<Bundles.Source> sources;
     private int source = -1;
     private long session;
+    /** The bundle's, then the visitor's own. */
     private String[] patterns = {};
+    private int baked;
+    private OwnPictures own;
+    private Corners corners;
+    /** Of the bundle's scenes, and the one that the visitor's next picture gets. */
+    private List<String> models;
+    private int model;
+    /** The next photo is of a picture of the visitor's own. */
+    private volatile boolean taking;
     private Texts texts;
     /** Null: the bundle plays nothing. */
     private Media media;
@@ -99,6 +114,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         words = new Words(getAssets(), Locale.getDefault());
         bundles = new Bundles(this);
         photos = new Photos(this, getString(R.string.title));
+        own = new OwnPictures(this);
         diagnostics = new Diagnostics();
         setContentView(R.layout.main);
         screen = (ViewGroup) findViewById(R.id.screen);
@@ -108,6 +124,9 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         info = findViewById(R.id.info);
         caption = (TextView) findViewById(R.id.caption);
         setVolumeControlStream(AudioManager.STREAM_MUSIC);
+        corners = new Corners(this, words);
+        ((ViewGroup) findViewById(R.id.own_photo)).addView(corners, new ViewGroup.LayoutParams(-1, -1));
+        for (int i = 0; i < MENU.length; i++) label(MENU[i], MENU_WORDS[i]);
         label(R.id.picture, "picture");
         label(R.id.record, "record");
         label(R.id.share, "share");
@@ -167,6 +186,12 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
                 break;
             case RECORDING:
                 label(R.id.record, message.arg1 != 0 ? "stop" : "record");
+                break;
+            case PHOTO:
+                edit((Bitmap) message.obj);
+                break;
+            case MADE:
+                made((OwnPictures.Photo) message.obj);
                 break;
             case SAVED:
                 showIf(findViewById(R.id.share), true);
@@ -357,8 +382,11 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     private void use(int index, long opened) throws ModarException {
         source = index;
         Bundles.Source from = sources.get(index);
-        patterns = new String[Native.patternCount(opened)];
-        for (int i = 0; i < patterns.length; i++) patterns[i] = Native.patternName(opened, i);
+        baked = Native.patternCount(opened);
+        patterns = new String[baked + own.addTo(opened)];
+        for (int i = 0; i < patterns.length; i++) patterns[i] = i < baked ? Native.patternName(opened, i) : words.get("own-name");
+        models = OwnPictures.models(opened);
+        model = 0;
         session = opened;
         texts = new Texts(bundles.texts(from), opened, patterns, Locale.getDefault());
         hint.setImageBitmap(bundles.hint(from));
@@ -384,6 +412,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         gestures = new Gestures();
         move();
         from.session = opened;
+        showMenu(null);
         if (!bundles.isVerified(from)) new Job("modar-verify", from).start();
     }
 
@@ -478,6 +507,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         public void run() {
             if (of instanceof Bundles.Source) verify((Bundles.Source) of);
             if (of instanceof Update) fetch((Update) of);
+            if (of instanceof OwnPictures.Photo) make((OwnPictures.Photo) of);
             if (of instanceof Bitmap || of instanceof File) save(of);
         }
     }
@@ -492,7 +522,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         }
         if (System.nanoTime() < noticeUntil) return;
         boolean looking = false;
-        String text = trouble;
+        String text = trouble == null && taking ? words.get("own-how") : trouble;
         if (text == null) {
             int seen = stage.seen();
             looking = seen < 0;
@@ -636,8 +666,8 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
 
     /** From the camera's picture to the models alone, and back. */
     private void lookAround() {
-        if (session == 0 || patterns.length == 0) return;
-        look(orbit == null ? new Orbit(Math.max(0, stage.seen())) : null);
+        if (session == 0 || baked == 0) return;
+        look(orbit == null ? new Orbit(Math.max(0, stage.seen()) % baked) : null);
     }
 
     private void look(Orbit around) {
@@ -659,7 +689,107 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     }
 
     private void showMore() {
-        showIf(findViewById(R.id.models), sources.size() > 1 || (orbit != null && patterns.length > 1));
+        showIf(findViewById(R.id.models), sources.size() > 1 || (orbit != null && baked > 1));
+    }
+
+    // --- The menu, and pictures of one's own ---
+
+    /** View.VISIBLE, View.GONE, or null: as it is. */
+    private void showMenu(Boolean shown) {
+        if (shown != null) showIf(findViewById(R.id.menu), shown);
+        boolean may = session != 0 && !models.isEmpty();
+        showIf(findViewById(R.id.menu_take), may);
+        showIf(findViewById(R.id.menu_choose), may);
+        showIf(findViewById(R.id.menu_model), may && models.size() > 1);
+        showIf(findViewById(R.id.menu_forget), !own.isEmpty());
+        if (may) ((TextView) findViewById(R.id.menu_model)).setText(words.get("menu-model", texts.model(models.get(model))));
+    }
+
+    /** Points the camera at what becomes a picture of one's own, without models. */
+    private void take(boolean on) {
+        taking = on;
+        stage.setBare(on);
+        label(R.id.picture, on ? "own-take" : "picture");
+        if (on && orbit != null) look(null);
+        follow();
+    }
+
+    private void choosePicture() {
+        Intent choose = new Intent(Intent.ACTION_GET_CONTENT);
+        choose.setType("image/*");
+        choose.addCategory(Intent.CATEGORY_OPENABLE);
+        try {
+            startActivityForResult(choose, CHOSEN_PICTURE);
+        } catch (ActivityNotFoundException none) {
+            diagnostics.error(none.getMessage());
+        }
+    }
+
+    @Override
+    protected void onActivityResult(int request, int result, Intent answer) {
+        if (request != CHOSEN_PICTURE || result != RESULT_OK || answer == null || answer.getData() == null) return;
+        try {
+            edit(own.read(answer.getData()));
+        } catch (IOException unreadable) {
+            notice(words.get("own-unreadable", unreadable.getMessage()));
+        } catch (RuntimeException refused) { // other apps throw what they like
+            notice(words.get("own-unreadable", refused.getMessage()));
+        }
+    }
+
+    /** Its corners are shown, to be mended; null: back. */
+    private void edit(Bitmap photo) {
+        if (taking) take(false);
+        corners.show(photo);
+        findViewById(R.id.own_use).setEnabled(photo != null);
+        showIf(findViewById(R.id.own), photo != null);
+        showMenu(false);
+    }
+
+    private void useOwn() {
+        Bitmap photo = corners.photo();
+        findViewById(R.id.own_use).setEnabled(false);
+        new Job("modar-own", new OwnPictures.Photo(corners.pixels(), photo.getWidth(), photo.getHeight(), corners.at.clone(), model)).start();
+    }
+
+    /** Beside what the visitor does. */
+    private void make(OwnPictures.Photo photo) {
+        try {
+            photo.make();
+            own.keep(photo);
+        } catch (ModarException plain) {
+            diagnostics.error(plain.getMessage());
+            say(NOTICE, words.get("own-plain"));
+        } catch (IOException full) { // it works until the app ends
+            diagnostics.error(full.getMessage());
+        }
+        main.obtainMessage(MADE, photo).sendToTarget();
+    }
+
+    /** Looks for the new picture as well: from now on, and on later visits. */
+    private void made(OwnPictures.Photo photo) {
+        findViewById(R.id.own_use).setEnabled(true);
+        if (photo.record == null || session == 0) return;
+        edit(null);
+        reopen();
+    }
+
+    /** The bundle that is shown, with the visitor's pictures as they are kept now. */
+    private void reopen() {
+        source--;
+        showNext();
+        showMenu(null);
+    }
+
+    @Override
+    public void onBackPressed() {
+        if (findViewById(R.id.own).getVisibility() == View.VISIBLE) edit(null);
+        else if (taking) take(false);
+        else if (findViewById(R.id.menu).getVisibility() == View.VISIBLE) {
+            super.onBackPressed();
+            return;
+        }
+        showMenu(true);
     }
 
     // --- Gestures ---
@@ -724,6 +854,27 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
             case R.id.picture:
                 stage.takePicture();
                 break;
+            case R.id.menu_go:
+                showMenu(false);
+                break;
+            case R.id.menu_take:
+                showMenu(false);
+                take(true);
+                break;
+            case R.id.menu_choose:
+                choosePicture();
+                break;
+            case R.id.menu_model:
+                model = (model + 1) % models.size();
+                showMenu(null);
+                break;
+            case R.id.menu_forget:
+                own.forget();
+                reopen();
+                break;
+            case R.id.own_use:
+                useOwn();
+                break;
             case R.id.record:
                 stage.record(getCacheDir());
                 break;
@@ -734,7 +885,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
                 lookAround();
                 break;
             case R.id.models:
-                if (orbit != null && orbit.pattern + 1 < patterns.length) {
+                if (orbit != null && orbit.pattern + 1 < baked) {
                     look(new Orbit(orbit.pattern + 1));
                 } else {
                     showNext();
@@ -771,6 +922,10 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
             }
         }
         Bitmap bitmap = Bitmap.createBitmap(pixels, width, height, Bitmap.Config.ARGB_8888);
+        if (taking) {
+            main.obtainMessage(PHOTO, OwnPictures.small(bitmap)).sendToTarget();
+            return;
+        }
         new Job("modar-picture", bitmap).start();
     }
 

@@ -28,7 +28,29 @@ public final class Native {
     /** Reads the whole bundle and compares the hash of each section. */
     public static native void verify(long session) throws ModarException;
 
+    /** The bundle's, then those of addPattern(). */
     public static native int patternCount(long session) throws ModarException;
+
+    /** The model of a scene, by index from 0 on; -1: no more. */
+    public static native int sceneModel(long session, int index) throws ModarException;
+
+    /**
+     * With the camera stopped and no frame in use, before setCamera(): a picture of the visitor's own is looked for as well.
+     *
+     * @param record of photoRecord()
+     * @param scene what stands on it
+     */
+    public static native void addPattern(long session, byte[] record, int scene) throws ModarException;
+
+    /**
+     * The corners of one flat thing in a photo, x and y clockwise from the top left; false: there is no such thing.
+     *
+     * @param argb as Bitmap.getPixels() gives them
+     */
+    public static native boolean photoCorners(int[] argb, int width, int height, float[] corners) throws ModarException;
+
+    /** What the picture between the corners is recognised by: takes a second on a phone. "pattern.plain": there is too little in it. */
+    public static native byte[] photoRecord(int[] argb, int width, int height, float[] corners) throws ModarException;
 
     public static native String patternName(long session, int index) throws ModarException;
 

@@ -29,6 +29,11 @@ public final class Poses {
         return floats.get(pattern * FLOATS + index);
     }
 
+    /** As if nothing was seen. */
+    void clear() {
+        for (int i = 0; i < patterns; i++) floats.put(i * FLOATS + 1, 0);
+    }
+
     /** As if a pattern was seen, without a camera. */
     void show(int pattern) {
         for (int i = 0; i < patterns; i++) floats.put(i * FLOATS + 1, i == pattern ? 1 : 0);

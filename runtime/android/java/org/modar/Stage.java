@@ -32,6 +32,8 @@ final class Stage implements GLSurfaceView.Renderer {
     /** Null: the bundle has no labels. */
     private volatile Marks marks;
     private volatile boolean wantsPicture;
+    /** The camera's picture alone: for a photo of the visitor's own picture. */
+    private volatile boolean bare;
     private volatile int displayDegrees;
     private volatile int sensorDegrees;
     private volatile int seen = -1;
@@ -94,6 +96,11 @@ final class Stage implements GLSurfaceView.Renderer {
         if (around != orbit) wantsReset = true;
         orbit = around;
         seen = -1;
+        view.requestRender();
+    }
+
+    void setBare(boolean on) {
+        bare = on;
         view.requestRender();
     }
 
@@ -215,6 +222,7 @@ final class Stage implements GLSurfaceView.Renderer {
                 act(System.nanoTime() * 1e-9, lookedAt);
                 Native.onDrawOrbit(session, around.pattern, around.turn, around.tilt, around.zoom);
             } else if (shown != null) {
+                if (bare) shown.poses.clear();
                 act(shown.timeS, shown.poses);
                 shown.draw(session);
             } else {

@@ -44,6 +44,11 @@ public final class AppRun {
             System.out.println("the day is over");
             return;
         }
+        if (words[7].equals("own")) {
+            own(words[8]);
+            System.out.println("the day is over");
+            return;
+        }
         if (words.length > 8) {
             network(Paths.get(words[8]));
             System.out.println("the day is over");
@@ -372,6 +377,116 @@ public final class AppRun {
         click(R.id.record);
         check(deliver(0), "goes on");
         check(status().equals("No video: no encoder is free") && android.media.MediaCodec.open == 0, "no encoder: " + status());
+        app.onPause();
+        app.onDestroy();
+    }
+
+    private static android.view.View shown(int id) {
+        android.view.View view = app.findViewById(id);
+        check(view.getVisibility() == android.view.View.VISIBLE, "there: " + id);
+        return view;
+    }
+
+    private static boolean gone(int id) {
+        return app.findViewById(id).getVisibility() == android.view.View.GONE;
+    }
+
+    private static android.view.View corners() {
+        return ((android.view.ViewGroup) app.findViewById(R.id.own_photo)).children.get(0);
+    }
+
+    /** What the corners' view draws. */
+    private static android.graphics.Canvas drawn() {
+        android.graphics.Canvas canvas = new android.graphics.Canvas();
+        corners().draw(canvas);
+        check(canvas.lines == 4 && canvas.circles.size() == 4, "four corners");
+        return canvas;
+    }
+
+    /** Where the print lies in the first frame of the test's clip, pixels. */
+    private static final int PRINT_LEFT = 135, PRINT_TOP = 30, PRINT_RIGHT = 345, PRINT_BOTTOM = 330;
+
+    /**
+     * The clip shows a picture that the bundle does not know: photographed, its corners mended, it has the chosen model; on later
+     * visits, too, until it is forgotten. other: a file of a picture.
+     */
+    private static void own(String other) throws Exception {
+        start();
+        check(!gone(R.id.menu), "the app opens with the menu");
+        click(R.id.menu_go);
+        check(gone(R.id.menu), "go");
+        byte[] alone = shown();
+        app.onBackPressed();
+        check(!gone(R.id.menu) && !Activity.left, "back to the menu");
+        check(((TextView) shown(R.id.menu_model)).text.equals("Model: pottery") && gone(R.id.menu_forget), "the first model");
+        click(R.id.menu_model);
+        check(((TextView) shown(R.id.menu_model)).text.startsWith("Model: bust"), "the other model");
+        click(R.id.menu_take);
+        check(status().startsWith("Photograph something flat") && ((TextView) shown(R.id.picture)).text.equals("Photograph"), "how");
+        app.onBackPressed();
+        check(!gone(R.id.menu) && ((TextView) app.findViewById(R.id.picture)).text.equals("Picture"), "not now");
+        click(R.id.menu_take);
+        check(deliver(0), "a frame");
+        click(R.id.picture);
+        view.frame();
+        Handler.pump();
+        shown(R.id.own);
+        android.view.View corners = corners();
+        check(drawn().bitmap.getWidth() == Camera.width && corners.described.equals("Corner 1"), corners.described);
+        // The photo is as large as its view. Found were the print's corners, which lie on the screen as the sensor does.
+        float[][] found = drawn().circles.toArray(new float[0][]);
+        double scale = (double) Camera.width / Camera.height;
+        double[][] print = {{PRINT_TOP, PRINT_RIGHT}, {PRINT_BOTTOM, PRINT_RIGHT}, {PRINT_BOTTOM, PRINT_LEFT}, {PRINT_TOP, PRINT_LEFT}};
+        for (int i = 0; i < 4; i++) {
+            // Turned clockwise: what is above lies on the right. Clockwise from the top left.
+            double x = Camera.width - scale * print[(i + 2) % 4][0], y = Camera.height / 2.0 + scale * (print[(i + 2) % 4][1] - Camera.width / 2.0);
+            check(Math.hypot(found[i][0] - x, found[i][1] - y) < 8, "corner " + i + ": " + found[i][0] + " " + found[i][1] + " is not " + x + " " + y);
+        }
+        corners.onTouchEvent(new MotionEvent(MotionEvent.ACTION_DOWN, found[0][0], found[0][1]));
+        corners.onTouchEvent(new MotionEvent(MotionEvent.ACTION_MOVE, found[0][0] + 20, found[0][1] + 3));
+        check(drawn().circles.get(0)[0] == found[0][0] + 20 && drawn().circles.get(0)[1] == found[0][1] + 3, "a dragged corner");
+        for (int i = 0; i < 4; i++) corners.performClick();
+        check(corners.described.equals("Corner 1"), "once around");
+        android.view.KeyEvent key = new android.view.KeyEvent();
+        for (int i = 0; i < 10; i++) corners.onKeyDown(android.view.KeyEvent.KEYCODE_DPAD_LEFT, key);
+        corners.onKeyDown(android.view.KeyEvent.KEYCODE_DPAD_UP, key);
+        check(Math.hypot(drawn().circles.get(0)[0] - found[0][0], drawn().circles.get(0)[1] - found[0][1]) < 2, "keys bring it back");
+        click(R.id.own_use);
+        joinAll("modar-own");
+        Handler.pump();
+        check(gone(R.id.own) && new File(Context.folder, "own").list().length == 1, "kept: " + status());
+        check(Camera.opened == 1, "the camera goes on");
+        byte[] standing = shown();
+        check(changed(alone, standing) > 0.02, "the model stands on it: " + changed(alone, standing));
+        Handler.pump();
+        check(view.described.contains("Your picture"), view.described);
+        app.onPause();
+        app.onDestroy();
+        start();
+        click(R.id.menu_go);
+        check(changed(alone, shown()) > 0.02, "on the next visit, too");
+        // A wall, through another app.
+        app.onBackPressed();
+        click(R.id.menu_choose);
+        check(Activity.wanted.type.equals("image/*"), "asks another app");
+        android.content.Intent answer = new android.content.Intent("", new android.net.Uri(other));
+        app.onActivityResult(2, Activity.RESULT_OK, answer);
+        check(drawn().bitmap.getWidth() == 1024, "as large as it has to be: " + drawn().bitmap.getWidth());
+        check(Math.abs(drawn().circles.get(0)[0] - 0.1 * Camera.width) < 1 && Math.abs(drawn().circles.get(2)[1] - 0.9 * Camera.height) < 1,
+                "corners at its margins");
+        click(R.id.own_use);
+        joinAll("modar-own");
+        check(status().startsWith("There is too little in this picture"), "too plain");
+        shown(R.id.own);
+        app.onBackPressed();
+        check(gone(R.id.own) && !gone(R.id.menu), "back");
+        app.onActivityResult(2, Activity.RESULT_OK, new android.content.Intent("", new android.net.Uri(other + ".none")));
+        check(status().startsWith("This file is no picture"), "no file");
+        shown(R.id.menu_forget).click();
+        check(new File(Context.folder, "own").list().length == 0 && gone(R.id.menu_forget), "forgotten");
+        check(changed(alone, shown()) < 0.001, "nothing stands there: " + changed(alone, shown()));
+        app.onBackPressed();
+        check(Activity.left, "from the menu out");
         app.onPause();
         app.onDestroy();
     }
