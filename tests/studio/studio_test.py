@@ -8,6 +8,7 @@ import statistics
 import subprocess
 import sys
 import time
+import tomllib
 import unittest
 
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[1] / room) for room in ("cli", "web")]
@@ -308,6 +309,47 @@ class Page(StudioTest):
         self.assert_no_errors()
         self.corners[1] = (self.corners[1][0] - 2, self.corners[1][1] + 1)
         self.assert_the_page_plays()
+
+    # ---- shapes ----
+
+    def type_in(self, field, text):
+        self.hand.click(f"#{field}")
+        self.hand.call("Input.insertText", text=text)  # a field that is empty
+        self.hand.press("Tab")
+
+    def test_a_scan_on_a_cup_as_a_ruler_says_it(self):
+        """Lengths only. The cup is seen under the model, and what stands on it is measured in its millimetres."""
+        self.project.mkdir()
+        picture(self.project / "band.png")
+        picture(self.project / "twin.png")
+        shutil.copy(POTTERY, self.project)
+        (self.project / "modar.toml").write_text('[[pattern]]\nfile = "*.png"\n\n[[model]]\nfile = "pottery.obj"\n\n[[scene]]\npattern = "band"\nmodel = "pottery"\n')
+        self.start()
+        hand = self.hand
+        hand.run("location.hash = '#/picture/band'")
+        hand.click("input[value=a4]")
+        self.wait_for("width-mm = 297")
+        hand.wait("document.querySelector('.advice a')", "the twin, which is a rival")
+        self.assertEqual(hand.run("document.querySelector('.advice a').hash"), "#/picture/twin")
+        hand.click("input[value=cone]")
+        for field, text in (("top", "8"), ("bottom", "6"), ("along", "11")):
+            self.type_in(field, text)
+        self.wait_for("shape = ")
+        [table] = [one for one in tomllib.loads(self.toml())["pattern"] if one["file"] == "band.png"]  # of half of a cup with 7 cm in the middle, and 0.1 degrees more
+        self.assertEqual({key: table[key] for key in table if key != "file"}, {"shape": "cone,top=80mm,bottom=60mm,arc=180.1"})
+        hand.run("document.getElementById('arc').focus(); location.hash = '#/scene/band'")
+        hand.settle()
+        drawn = hand.run("""(canvas => [canvas.hidden, ...[0.5, 0.02].map((y) => canvas.getContext('2d').getImageData(canvas.width / 2, y * canvas.height, 1, 1).data[3])])
+          (document.querySelector('.body'))""")
+        self.assertEqual(drawn, [False, 255, 0])
+        self.look("cup")
+        self.assertEqual(hand.run("document.querySelector('#size').closest('.number').innerText.trim()"), "cm")
+        self.assert_no_errors()
+        while hand.run("fetch('api/project').then((answer) => answer.json()).then(({ bundle }) => bundle.stale)"):
+            time.sleep(0.2)
+        bundle = next((self.project / "out").glob("*.modar"))
+        [band, _] = self.modar_json("inspect", bundle)["patterns"]
+        self.assertAlmostEqual(band["width_mm"], 110, delta=0.1)
 
     # ---- names and texts ----
 

@@ -152,6 +152,7 @@ const Studio = {
 
 /** Who comes by keys or a screen reader begins at the screen's head. */
 function opened() {
+  document.activeElement?.blur();  // what was typed counts, and is told while its field is still there
   m.redraw();
   requestAnimationFrame(() => document.getElementById('title')?.focus({ preventScroll: true }));
 }

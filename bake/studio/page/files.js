@@ -114,10 +114,13 @@ function pictureCard(pattern) {
 
 function modelCard(model) {
   const scene = state.project.scenes.find((each) => each.model === model.name && patternOf(each.pattern));
-  const content = [modelThumb(model), m('span.about', m('b', name(model.name)), m('small', model.triangles ? t('triangles', { n: model.triangles }) : ''))];
-  const lacking = model.missing.length > 0 && m('div.lacking', finding({ text: t('missing', { files: model.missing.join(', ') }), cure: t('missingCure') }), chooser(t('chooseIt'), { kind: '.quiet.small' }));
-  return m('li', { key: model.name }, scene ? m('a.card', { href: `#/scene/${encodeURIComponent(scene.pattern)}` }, content) : m('div.card', content), lacking);
+  const content = [modelThumb(model), m('span.about', m('b', name(model.name)), m('small', model.missing.length ? [icon('warn'), t('incomplete')] : model.triangles ? t('triangles', { n: model.triangles }) : ''))];
+  return m('li', { key: model.name }, scene ? m('a.card', { href: `#/scene/${encodeURIComponent(scene.pattern)}` }, content) : m('div.card', content));
 }
+
+/** What models name and the folder lacks, where it is seen at once. */
+const lacking = () => state.project.models.filter(({ missing }) => missing.length).map((model) => m('div.lacking', { key: model.name },
+  finding({ text: [name(model.name), ': ', t('missing', { files: model.missing.join(', ') })], cure: t('missingCure') }, m('p', chooser(t('chooseIt'), { kind: '.quiet.small' })))));
 
 const welcome = () => m('div.welcome', m('div.art', { 'aria-hidden': 'true' }, icon('picture'), icon('add'), icon('model')),
   head(t('welcome'), t('welcomeLead')), m('p.row', chooser(t('chooseFiles'), { kind: '.primary' }), chooser(t('chooseFolder'), { folder: true, kind: '.quiet' })),
@@ -148,7 +151,7 @@ export const Files = {
       text: `${problem.file ? `${problem.file}${problem.line ? `:${problem.line}` : ''}: ` : ''}${problem.text}`, cure: problem.cure, lang: 'en' })));
     if (init) return m('div.screen.narrow', found(init), told);
     if (!models.length && !patterns.length) return m('div.screen.narrow', welcome(), busy, told);
-    return m('div.screen', m('div.top', head(t('files'), t('filesLead')), m('p.row', chooser(t('addFiles'), { kind: '.quiet', shape: 'add' }), whatNext())), busy, told,
+    return m('div.screen', m('div.top', head(t('files'), t('filesLead')), m('p.row', chooser(t('addFiles'), { kind: '.quiet', shape: 'add' }), whatNext())), busy, told, m('div', lacking()),
       group(t('pictures'), patterns.length, patterns.map(pictureCard), t('nextPhoto')), group(t('models'), models.length, models.map(modelCard), t('nextModel')));
   },
 };

@@ -67,8 +67,13 @@ export const NumberField = {
     const { id, label, value, unit, step = 1, least = -Infinity, most = Infinity, digits = 2, empty = false, onvalue } = attrs;
     const shown = state.draft ?? (value === null || value === undefined ? '' : String(Number(value.toFixed(digits))));
     const within = (wanted) => Math.min(most, Math.max(least, Number(wanted.toFixed(digits))));
-    const finish = () => {
+    const finish = (event) => {
       clearTimeout(state.timer);
+      // A field that is taken away loses the focus while the page is drawn, where Mithril would draw at once: in the middle of itself.
+      if (event?.type === 'blur') {
+        event.redraw = false;
+        queueMicrotask(m.redraw);
+      }
       if (state.draft === null) return;
       const typed = numberIn(state.draft);
       state.draft = null;
@@ -84,7 +89,7 @@ export const NumberField = {
         const from = numberIn(state.draft ?? '') ?? value ?? 0;
         state.draft = String(within(from + way * step * (event.shiftKey ? 10 : 1)));
         clearTimeout(state.timer);
-        state.timer = setTimeout(finish, STEPS_REST_MS);
+        state.timer = setTimeout(() => finish(), STEPS_REST_MS);
       } else event.redraw = false;
     };
     return m('div.field', m('label', { for: id }, label), m('span.number',

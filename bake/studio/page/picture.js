@@ -4,7 +4,8 @@ import { Corners } from './corners.js';
 import { unsure } from './files.js';
 import { button, choice, finding, grade, head, icon, LengthField, name, NumberField } from './parts.js';
 import { rail } from './rail.js';
-import { addScene, deleteAsset, loadScore, setPattern, state, tellError } from './state.js';
+import { arcOf, alongOf, widthOf } from './surface.js';
+import { addScene, deleteAsset, loadRivals, loadScore, setPattern, state, tellError } from './state.js';
 import { number, t } from './words.js';
 
 const m = window.m;
@@ -16,7 +17,13 @@ const PAPERS = { a4: [210, 297], a5: [148, 210], postcard: [105, 148] };
 const SIDES = ['right', 'left', 'top', 'bottom', 'back'];
 const KINDS = [['flat', 'flat'], ['cylinder', 'label'], ['cone', 'cup'], ['box', 'box']];
 
+/** Milliseconds on the screen until its picture is compared with the others, which takes some seconds of all processors. */
+const RIVALS_AFTER_MS = 1500;
+
 const near = (a, b) => Math.abs(a - b) < 0.6;  // millimetres
+
+/** What surface.js takes for diameters; null: they are not all told. */
+const diameters = (kind, { top, bottom }) => (kind === 'cone' ? top && bottom && { top_mm: top, bottom_mm: bottom } : top && { top_mm: top }) || null;
 
 /** Upright sizes of photos by file, for those that the project does not state. */
 const photoSizes = new Map();
@@ -92,14 +99,16 @@ function verdict(pattern) {
   const score = state.scores.get(pattern.name);
   if (!score) loadScore(pattern.name);
   if (!score || score.pending) return m('p.small', { 'aria-busy': 'true' }, t('judging'));
-  if (score.failed) return finding({ text: score.failed, cure: score.cure, lang: 'en' });
-  return m('div.verdict', m('p', grade(score.grade), m('b', t(`grade.${score.grade}`))), m('p.small', reach(score, pattern.width_mm)));
+  if (score.failed) return null;
+  return m('div.verdict', m('p', grade(score.grade), m('b', t(`grade.${score.grade}`))), m('p.small', reach(score, widthOf(pattern))));
 }
 
 function advice(pattern) {
-  const { advice: some = [], rivals = [] } = state.scores.get(pattern.name) ?? {};
-  return m('div.advice', unsure.has(pattern.name) && finding({ text: t('unsure'), cure: t('unsureCure') }),
-    rivals.map(({ pattern: other, times, views }) => finding({ text: t('rival', { name: other, times, views }) }, m('a', { href: `#/picture/${encodeURIComponent(other)}` }, name(other)))),
+  const { advice: some = [] } = state.scores.get(pattern.name) ?? {};
+  const rivals = state.rivals.get(pattern.name);
+  return m('div.advice', { 'aria-live': 'polite' },
+    rivals?.found?.map(({ pattern: other, times, views }) => finding({ text: t('rival', { name: other, times, views }) }, m('p', m('a', { href: `#/picture/${encodeURIComponent(other)}` }, t('rivalSee', { name: other }))))),
+    rivals?.pending && m('p.small', t('comparing')),
     some.filter(({ text }) => text).map(({ id }) => finding({ text: t(`advice.${id}`), severity: 'note' })));
 }
 
@@ -107,10 +116,15 @@ function advice(pattern) {
 
 /** Attributes: pattern. What is chosen and not yet complete is kept here: a paper, a shape without its sizes. */
 export class Picture {
-  oninit() {
+  oninit({ attrs }) {
+    this.rivals = setTimeout(() => loadRivals(attrs.pattern.name), RIVALS_AFTER_MS);
     this.paper = this.kind = null;
     this.shape = {};
     this.features = true;
+  }
+
+  onremove() {
+    clearTimeout(this.rivals);
   }
 
   /** The width and height of a sheet that lies as the picture does. */
@@ -120,9 +134,9 @@ export class Picture {
     return width > height ? [long, short] : [short, long];
   }
 
-  paperOf({ width_mm: width, height_mm: height }) {
+  paperOf({ width_mm: width, height_mm: height, corners }) {
     if (!width) return 'later';
-    return Object.keys(PAPERS).find((paper) => [PAPERS[paper], [...PAPERS[paper]].reverse()].some(([w, h]) => near(w, width) && near(h, height ?? 0))) ?? 'other';
+    return Object.keys(PAPERS).find((paper) => [PAPERS[paper], [...PAPERS[paper]].reverse()].some(([w, h]) => near(w, width) && (height ? near(h, height) : !corners))) ?? 'other';
   }
 
   choosePaper(pattern, paper) {
@@ -130,7 +144,7 @@ export class Picture {
     if (paper === 'later') setPattern(pattern.name, { ...(pattern.width_mm && { 'width-mm': null }), ...(pattern.height_mm && { 'height-mm': null }) });
     if (!(paper in PAPERS)) return;
     const [width, height] = this.sheet(paper);
-    setPattern(pattern.name, { 'width-mm': width, 'height-mm': height });
+    setPattern(pattern.name, { 'width-mm': width, ...(pattern.corners && { 'height-mm': height }) });  // a scan has its own proportions
   }
 
   sizes(pattern) {
@@ -139,7 +153,7 @@ export class Picture {
     return [choice('paper', t('howLarge'), [['a4', t('a4')], ['a5', t('a5')], ['postcard', t('postcard')], ['other', t('measured')], ['later', t('later')]], paper,
       (value) => this.choosePaper(pattern, value)),
     paper === 'other' && m('div.fields', m(LengthField, { id: 'width', label: t('width'), value: pattern.width_mm, least: 1, empty: true, choose: true, onvalue: set('width-mm') }),
-      m(LengthField, { id: 'height', label: t('heightIfKnown'), value: pattern.height_mm, least: 1, empty: true, onvalue: set('height-mm') })),
+      pattern.corners && m(LengthField, { id: 'height', label: t('heightIfKnown'), value: pattern.height_mm, least: 1, empty: true, onvalue: set('height-mm') })),
     paper === 'later' && m('p.small', t('laterWords'))];
   }
 
@@ -159,13 +173,19 @@ export class Picture {
 
   setShape(pattern, kind, values) {
     Object.assign(this.shape, values);
-    const { top, bottom, arc, width, height, depth, ...sides } = this.shapeOf(pattern, kind);
+    const { along } = this.shape;
+    const round = diameters(kind, this.shapeOf(pattern, kind));
+    if (along && round) Object.assign(this.shape, { along: undefined, arc: Number(arcOf(round, along).toFixed(1)) });
+    const { along: _, top, bottom, arc, width, height, depth, ...sides } = this.shapeOf(pattern, kind);
     const mm = (value) => `${Number(value.toFixed(2))}mm`;
     const words = kind === 'cylinder' ? top && arc && [`diameter=${mm(top)}`, `arc=${arc}`]
       : kind === 'cone' ? top && bottom && arc && [`top=${mm(top)}`, `bottom=${mm(bottom)}`, `arc=${arc}`]
         : width && height && depth && [`size=${[width, height].map((value) => Number(value.toFixed(2))).join('x')}x${mm(depth)}`, ...SIDES.filter((side) => sides[side]).map((side) => `${side}=${sides[side]}`)];
     if (!words) return;
-    setPattern(pattern.name, { shape: [kind, ...words].join(',') }).then(() => {
+    // The shape tells the width; of a photo, the front's height makes its proportions those of the box.
+    const tall = kind === 'box' && pattern.corners ? Number(height.toFixed(2)) : null;
+    const sizes = { ...(pattern.width_mm && { 'width-mm': null }), ...((tall || pattern.height_mm) && { 'height-mm': tall }) };
+    setPattern(pattern.name, { ...sizes, shape: [kind, ...words].join(',') }).then(() => {
       this.kind = null;
       this.shape = {};
     });
@@ -181,12 +201,14 @@ export class Picture {
   shapeFields(pattern, kind) {
     const shape = this.shapeOf(pattern, kind);
     const size = (key, label, choose = false) => m(LengthField, { id: key, label, value: shape[key], least: 1, choose, onvalue: (mm) => this.setShape(pattern, kind, { [key]: mm }) });
+    const round = diameters(kind, shape);
+    const along = shape.along ?? (round && shape.arc ? alongOf(round, shape.arc) : null);
     if (kind === 'box') {
       return [m('div.fields', size('width', t('width'), true), size('height', t('height')), size('depth', t('depth'))),
         m('details', m('summary', t('sides')), m('div.fields', SIDES.map((side) => this.boxSide(pattern, shape, side))))];
     }
     return [m('div.fields', size('top', t(kind === 'cone' ? 'diameterTop' : 'diameter'), true), kind === 'cone' && size('bottom', t('diameterBottom')),
-      m(NumberField, { id: 'arc', label: t('arc'), value: shape.arc, unit: '°', least: 1, most: 360, step: 5, onvalue: (arc) => this.setShape(pattern, kind, { arc }) })),
+      m(LengthField, { id: 'along', label: t('along'), value: along, least: 1, onvalue: (mm) => this.setShape(pattern, kind, { along: mm }) }), m(NumberField, { id: 'arc', label: t('arc'), value: shape.arc, unit: '°', least: 1, most: 360, step: 5, onvalue: (arc) => this.setShape(pattern, kind, { arc }) })),
     m('p.small', t('arcWords'))];
   }
 
@@ -243,7 +265,8 @@ export class Picture {
   view({ attrs: { pattern } }) {
     const score = state.scores.get(pattern.name);
     return m('div.work', rail('picture', pattern), m('section.stage', { 'aria-label': t('photo') }, this.stage(pattern)),
-      m('aside.panel', m('div.fill', head(name(pattern.name)),
+      m('aside.panel', m('div.fill', head(name(pattern.name)), unsure.has(pattern.name) && finding({ text: t('unsure'), cure: t('unsureCure') }),
+        score?.failed && finding({ text: score.failed, cure: score.cure, severity: 'error', lang: 'en' }),
         m('div.seen', m(Preview, { pattern, score: this.features && score?.features ? score : null, handle: (preview) => { this.preview = preview; } }),
           m('div', verdict(pattern), m('label.check', m('input', { type: 'checkbox', checked: this.features, onchange: (event) => { this.features = event.target.checked; } }), t('showFeatures')))),
         this.shapes(pattern), advice(pattern), m('p', button(t('remove'), () => deleteAsset('pattern', pattern.name), { kind: '.link.small' }))),

@@ -129,9 +129,6 @@ export const halfOf = (model) => {
   return (model?.size ?? [1, 1, 1]).map((side) => side / most);
 };
 
-/** Millimetres in a unit of the picture's space: half its longer side; null: its width is not known. shape: {width, height}, any unit. */
-export const unitOf = (widthMm, { width, height }) => (widthMm ? (widthMm * Math.max(width, height)) / (2 * width) : null);
-
 /**
  * Model to picture, {matrix, scale}, of a scene before its bake is done. What the bake stores is exact; this takes the model's box for the model,
  * by which one that is turned by an odd angle stands a little too high, and is never drawn but relative to itself.

@@ -1,9 +1,10 @@
 // Step 3: models on a picture, moved by hand or by numbers, and the words beside them.
-import { boxOf, halfOf, isInMm, placed, rotation, multiply, turning, turnOf, unitOf, wrapped } from './placing.js';
+import { boxOf, halfOf, isInMm, placed, rotation, multiply, turning, turnOf, wrapped } from './placing.js';
 import { button, finding, head, icon, LengthField, name, NumberField, tool } from './parts.js';
 import { rail } from './rail.js';
 import { EYES, HANDLES, Stage } from './stage.js';
 import { addScene, deleteScene, modelOf, scenesOf, bundleBytes, setScene, state, tellError } from './state.js';
+import { surfaceOf } from './surface.js';
 import { modelViews } from './thumbs.js';
 import { languageName, length, number, t } from './words.js';
 
@@ -66,7 +67,7 @@ export class Scene {
   /** Brings the stage up to date with the project. */
   update() {
     if (!this.picture) return;
-    this.stage.show({ pattern: this.attrs.pattern, scenes: this.scenes(), selected: this.selected, picture: this.picture, tilting: this.tilting, unit: this.unit });
+    this.stage.show({ pattern: this.attrs.pattern, scenes: this.scenes(), selected: this.selected, surface: this.surface, tilting: this.tilting });
     const { bundle: baked } = state.project;
     if (!baked.baked || this.loaded === state.baked || baked.stale && this.loaded >= 0) return;
     this.loaded = state.baked;
@@ -74,8 +75,12 @@ export class Scene {
     bundleBytes().then((bytes) => this.stage.load(bytes, scenes)).catch(tellError);
   }
 
+  get surface() {
+    return surfaceOf(this.attrs.pattern, this.picture);
+  }
+
   get unit() {
-    return this.picture ? unitOf(this.attrs.pattern.width_mm, this.picture) : null;
+    return this.picture ? this.surface.unit : null;
   }
 
   scenes() {
@@ -102,13 +107,12 @@ export class Scene {
   // ---- the stage ----
 
   stageView(scenes) {
-    const { pattern } = this.attrs ?? {};
     return m('section.stage', { 'aria-label': t('stage') }, m('div.stage3d', { role: 'application', tabindex: 0, 'aria-label': t('stageHelp') },
       m('img.ground', { src: `api/picture?pattern=${encodeURIComponent(this.name)}&v=${encodeURIComponent(state.project.revision)}`, alt: '', draggable: false,
         onload: (event) => {
-          this.picture = { width: event.target.naturalWidth, height: event.target.naturalHeight, flat: (pattern?.kind ?? 'flat') === 'flat' };
+          this.picture = { width: event.target.naturalWidth, height: event.target.naturalHeight };
         } }),
-      m('div.layers', { 'aria-hidden': 'true' }),
+      m('canvas.body', { hidden: true, 'aria-hidden': 'true' }), m('div.layers', { 'aria-hidden': 'true' }),
       m('svg.guides', { 'aria-hidden': 'true' }, ['box', 'snap', 'ring', 'stem', 'tilt0', 'tilt1'].map((line) => m('path', { key: line, 'data-line': line }))),
       HANDLES.map((kind) => m('button.handle', { key: kind, type: 'button', hidden: true, 'data-handle': kind, title: t(`handle.${kind}`), 'aria-label': t(`handle.${kind}`), class: kind }, icon(kind.startsWith('tilt') ? 'turn' : kind))),
       m('output.tip', { hidden: true })),

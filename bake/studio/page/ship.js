@@ -2,12 +2,20 @@
 import { ask, askJson } from './api.js';
 import { button, finding, head, icon, meter, name, percent } from './parts.js';
 import { state, tellError } from './state.js';
-import { bytes, t } from './words.js';
+import { bytes, t, told } from './words.js';
 
 const m = window.m;
 const KINDS = ['page', 'zip', 'apk', 'release'];
 /** Parts that are named one by one; the others are one line. */
 const NAMED_PARTS = 6;
+
+const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1) + (/[.!?]$/.test(text) ? '' : '.');
+
+/** What the checker found, in the page's language where it has the words: {text, cure, lang}. */
+function issue(id, english, cure, place) {
+  const { text, lang } = told(`issue.${id}`, english);
+  return { text: [place?.name && [name(place.name), ': '], sentence(text)], cure: sentence(told(`issue.${id}.cure`, cure).text), lang };
+}
 
 export class Ship {
   oninit() {
@@ -55,7 +63,7 @@ export class Ship {
     if (!check) return m('section', m('h2', t('verdict')), m('p.small', { 'aria-busy': 'true' }, t('judging')));
     const words = check.good ? (check.warnings ? t('goodBut', { n: check.warnings }) : t('good')) : t('notGood', { n: check.errors });
     return m('section.judged', m('h2', t('verdict')), m(`p.verdict-words${check.good ? '.good' : '.not-good'}`, icon(check.good ? 'check' : 'bad'), words),
-      check.findings.map(({ severity, text, cure, place }) => finding({ severity, text, cure, lang: 'en' }, place && m('p', m('a', { href: `#/${place.view}${place.name ? `/${encodeURIComponent(place.name)}` : ''}` }, t('goThere'))))));
+      check.findings.map(({ severity, id, text: english, cure, place }) => finding({ severity, ...issue(id, english, cure, place) }, place && m('p', m('a', { href: `#/${place.view}${place.name ? `/${encodeURIComponent(place.name)}` : ''}` }, t('goThere'))))));
   }
 
   weights() {
@@ -72,7 +80,10 @@ export class Ship {
     if (!this.devices) return null;
     return m('section', m('h2', t('devices')), m('ul.devices', this.devices.map((device) => m('li', { key: device.name, class: device.fits ? 'fits' : 'fails' },
       icon(device.fits ? 'check' : 'bad'), m('span', device.title || device.name, m('span.unseen', ` ${t(device.fits ? 'fits' : 'fitsNot')}`),
-        !device.fits && m('small', { dir: 'auto' }, (device.findings ?? []).map(({ text }) => text).join(' ')))))));
+        (device.findings ?? []).filter(({ severity }) => severity === 'error').map(({ id, text: english, cure, place }) => {
+          const { text, cure: remedy, lang } = issue(id, english, cure, place);
+          return m('small', { dir: 'auto', lang }, text, ' ', remedy);
+        }))))));
   }
 
   // ---- how it leaves ----

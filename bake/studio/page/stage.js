@@ -1,6 +1,7 @@
 // The scene as the device draws it, by the engine that `modar web` ships, and the handles that move what stands on it.
 import { groundTransform, viewFrom } from './engine/turntable.js';
 import { View } from './engine/modar-view.js';
+import { SurfacePainter } from './surface.js';
 import { about, boxOf, covers, IDENTITY, inverse, meet, multiply, onScreen, placed, rotation, scaling, sight, translation, wrapped } from './placing.js';
 
 /** Across the stage's smaller side, degrees to radians: as a phone at arm's length sees. */
@@ -66,6 +67,7 @@ export class Stage {
     this.scenes = [];
     this.selected = null;
     this.tilting = false;
+    this.surface = new SurfacePainter(dom.querySelector('.body'), dom.querySelector('.ground'), () => this.draw());
     this.observer = new ResizeObserver(() => this.draw());
     this.observer.observe(dom);
     dom.addEventListener('pointerdown', (event) => this.#press(event));
@@ -119,20 +121,18 @@ export class Stage {
     for (const canvas of Object.values(layers)) canvas.remove();
   }
 
-  /** scenes: the project's, each with {key, asset (the model), half, matrix}. picture: {width, height, flat}. */
-  show({ pattern, scenes, selected, picture, tilting, unit }) {
+  /** scenes: the project's, each with {key, asset (the model), half, matrix}. surface: see surfaceOf(). */
+  show({ pattern, scenes, selected, surface, tilting }) {
     const first = this.pattern !== pattern || !this.#ground;
-    Object.assign(this, { pattern, scenes, selected, tilting, unit });
-    this.#ground = picture;
+    Object.assign(this, { pattern, scenes, selected, tilting, unit: surface.unit });
+    this.#ground = surface;
     if (first || !this.#pointers.size) this.#frameAll(first);
     this.draw();
   }
 
   /** What the eye goes round: the picture and what stands on it. */
   #frameAll(at_once) {
-    const most = Math.max(this.#ground.width, this.#ground.height);
-    const half = [this.#ground.width / most, this.#ground.height / most, 0];
-    const boxes = [{ low: half.map((side) => -side), high: half }, ...this.scenes.map((scene) => boxOf(scene.matrix, scene.half))];
+    const boxes = [this.#ground, ...this.scenes.map((scene) => boxOf(scene.matrix, scene.half))];
     const low = [0, 1, 2].map((axis) => Math.min(...boxes.map((box) => box.low[axis])));
     const high = [0, 1, 2].map((axis) => Math.max(...boxes.map((box) => box.high[axis])));
     const target = low.map((value, i) => (value + high[i]) / 2);
@@ -202,9 +202,11 @@ export class Stage {
     if (this.#glide) this.draw();
   }
 
-  #paintGround({ view, focal, size }) {
+  #paintGround(eye) {
+    const { view, focal, size } = eye;
     const image = this.dom.querySelector('.ground');
-    image.hidden = !this.#ground.flat;
+    image.hidden = this.#ground.faces.length > 0;
+    this.surface.paint(eye, this.#ground);
     const { naturalWidth: width, naturalHeight: height } = image;
     if (width) image.style.transform = `matrix3d(${groundTransform(view, focal, size, { width, height }).join()})`;
   }

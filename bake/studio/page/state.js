@@ -14,6 +14,8 @@ export const state = {
   baked: 0,
   /** Answers of api/score by pattern. */
   scores: new Map(),
+  /** What each pattern is taken for, by pattern: {found: [{pattern, times, views}]}, or {pending}. */
+  rivals: new Map(),
   /** The last exports by kind: {path, url}. */
   exported: new Map(),
   gone: false,
@@ -56,6 +58,8 @@ const lookOf = ({ file, corners, width_mm: width, height_mm: height, kind, arc_d
 function take(project) {
   const before = state.project;
   state.project = project;
+  const looks = (patterns = []) => patterns.map((pattern) => pattern.name + lookOf(pattern)).join();
+  if (looks(before?.patterns) !== looks(project.patterns)) state.rivals.clear();
   for (const pattern of project.patterns) {
     const known = before?.patterns.find(({ name }) => name === pattern.name);
     if (!known || lookOf(known) !== lookOf(pattern)) state.scores.delete(pattern.name);
@@ -177,6 +181,17 @@ export async function loadScore(name) {
   } catch (error) {
     state.scores.set(name, { failed: error.message, cure: error.cure });
   }
+  redraw();
+}
+
+/** What a phone may take a picture for, of the project's others. */
+export async function loadRivals(name) {
+  if (state.rivals.has(name) || state.project.patterns.length < 2) return;
+  const asked = { pending: true };
+  state.rivals.set(name, asked);
+  redraw();
+  const found = await askJson('GET', `rivals?pattern=${encodeURIComponent(name)}`).then(({ rivals }) => rivals, () => []);  // its own error is the score's
+  if (state.rivals.get(name) === asked) state.rivals.set(name, { found });
   redraw();
 }
 

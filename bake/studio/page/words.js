@@ -37,6 +37,9 @@ export function t(key, values = {}) {
   return text.replace(/\{(\w+)\}/g, (all, name) => (typeof values[name] === 'number' ? number(values[name]) : values[name] ?? all));
 }
 
+/** The words of a key, or what the server said in English: {text, lang}. */
+export const told = (key, english) => (words[key] ? { text: words[key] } : { text: english, lang: 'en' });
+
 export const number = (value) => numbers.format(value);
 
 export const languageName = (tag) => {
