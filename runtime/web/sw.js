@@ -8,14 +8,6 @@ const INSTALLED = `${OURS}installed`;  // by updates, see installed.js
 const SIMD = WebAssembly.validate(Uint8Array.of(
   0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 8, 1, 6, 0, 65, 0, 253, 15, 11));
 
-/** A file as one answer: browsers that keep parts, which a page has asked for, give it from these by a range only. */
-async function whole(request) {
-  const headers = request.url.includes('&first=') ? { Range: 'bytes=0-' } : {};
-  const response = await fetch(request, { headers });
-  if (!response.ok) throw new TypeError(`${request.url}: ${response.status}`);
-  return response.status === 206 ? new Response(response.body, { headers: { 'Content-Type': response.headers.get('Content-Type') } }) : response;
-}
-
 async function keepAll() {
   const other = SIMD ? 'plain.' : 'simd.';
   const files = SITE.files.filter((file) => !file.startsWith(`engine-${other}`) && !file.startsWith(`engine-record-${other}`));
@@ -23,8 +15,7 @@ async function keepAll() {
   // same wherever it lies, and the page has just loaded it.
   const cacheOf = (file) => (file.includes('?v=') ? 'force-cache' : 'no-cache');
   const requests = ['./', ...files].map((file) => new Request(file, { cache: cacheOf(file) }));
-  const cache = await caches.open(CACHE);
-  await Promise.all(requests.map(async (request) => cache.put(request, await whole(request))));
+  await (await caches.open(CACHE)).addAll(requests);
 }
 
 self.addEventListener('install', (event) => event.waitUntil(keepAll()));
