@@ -9,6 +9,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "bake/mesh/parallel_rays.hpp"
+
 namespace {
 
 using namespace modar;
@@ -105,6 +107,51 @@ TEST(RayTree, RaysMeetWhatTryingAllMeets) {
     EXPECT_NEAR(glm::length(point - (origin + nearest * direction)), 0.0, 1e-9);
   }
   EXPECT_GT(hits, 50);
+}
+
+TEST(ParallelRays, MeetWhatRaysOfATreeMeet) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> place(-1, 1);
+  std::uniform_real_distribution<float> near(-0.2f, 0.2f);
+  const auto point = [&](auto& along) {
+    return glm::vec3(along(random), along(random), along(random));
+  };
+  std::vector<glm::vec3> corners;
+  std::vector<ParallelRays::Triangle> triangles;
+  for (std::uint32_t t = 0; t < 400; ++t) {
+    const glm::vec3 middle = point(place) * 0.8f;
+    auto& size = t % 20 == 0 ? place : near;  // some span many cells
+    for (int i = 0; i < 3; ++i) corners.push_back(middle + point(size));
+    triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+  }
+  std::vector<glm::vec3> origins;
+  std::vector<glm::vec3> normals;
+  for (int i = 0; i < 700; ++i) {
+    origins.push_back(point(place));
+    normals.push_back(glm::normalize(point(place)));
+  }
+  const std::vector<glm::dvec3> exact(corners.begin(), corners.end());
+  const RayTree tree(exact, triangles);
+  ParallelRays rays(origins, normals, corners, triangles);
+  int met = 0;
+  for (const glm::vec3& axis : {glm::vec3(0, 0, 1), glm::normalize(glm::vec3(1, -2, 0.5f))}) {
+    rays.cast(axis, {0.01f, 0.9f});
+    ASSERT_EQ(rays.size(), origins.size());
+    std::vector<bool> seen(origins.size());
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const std::uint32_t p = rays.point(i);
+      seen[p] = true;
+      const float cosine = glm::dot(normals[p], axis);
+      EXPECT_NEAR(rays.cosine(i), std::fabs(cosine), 1e-6f);
+      const auto hit =
+          tree.first_hit(glm::dvec3(origins[p]), glm::dvec3(cosine < 0 ? -axis : axis), 0.01, 0.9);
+      EXPECT_NEAR(static_cast<double>(rays.distance(i)), hit ? hit->distance : 0.9, 1e-4) << p;
+      if (hit) ++met;
+    }
+    EXPECT_EQ(std::count(seen.begin(), seen.end(), true), 700) << "each point has one ray";
+  }
+  EXPECT_GT(met, 300);
+  EXPECT_LT(met, 1300);
 }
 
 }  // namespace
