@@ -249,7 +249,7 @@ def try_engines(folder):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--frames", type=int, default=60, help="of the clip (60)")
+    parser.add_argument("--frames", type=int, default=60, help="of the clip (60: a quick hand; 240: a slow one)")
     parser.add_argument("--seconds", type=float, default=8, help="of each visit (8)")
     parser.add_argument("--engines", action="store_true", help="try every browser instead")
     options = parser.parse_args()

@@ -20,6 +20,7 @@ from browser import Browser, Server, axe_core  # noqa: E402
 from programs import (COVER, COVERED, POTTERY, QUICK, READINGS, ROOT, TURNED, TURNS, ProgramTest, covered_clip,  # noqa: E402
                       demo_clip, picture, write_turns)
 
+BROTLI = shutil.which("brotli")
 PAGE = ROOT / "build" / "web" / "web"
 WIDTH, HEIGHT, FRAMES = 640, 480, 6
 # A folder that keeps the pictures, for people.
@@ -580,6 +581,11 @@ class Page(ProgramTest):
         self.assertIn("engine-simd.wasm", names)
         size = sum(len(gzip.compress((self.site / name).read_bytes(), 9)) for name in names)
         print(f"page and engine: {size} bytes gzipped, in {len(names)} files")
+        if BROTLI:
+            packed = {name: len(subprocess.run([BROTLI, "-q", "11", "-w", "24", "-c", self.site / name], capture_output=True, check=True).stdout)
+                      for name in names}
+            largest = sorted(packed.items(), key=lambda each: -each[1])[:3]
+            print(f"by brotli: {sum(packed.values())} bytes, of these", ", ".join(f"{name} {bytes_}" for name, bytes_ in largest))
         self.assertLess(size, 250_000)
 
     def test_scripts_are_short_and_say_what_is_wrong(self):
