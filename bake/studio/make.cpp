@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 
 #include "bake/process/process.hpp"
@@ -174,9 +175,16 @@ Result<Export> export_of(Session& session, const std::string& kind, const Json& 
   } else if (kind == "apk") {
     const std::string script = app_script();
     if (script.empty()) {
+      return fail(
+          ExitCode::kUnsupported, "studio.package", "apk",
+          "an Android app is compiled from ModAR's sources, which this program came without",
+          "start the studio from its sources, or make the web page, which needs no app");
+    }
+    // Without it the script makes an APK that no phone can start.
+    if (std::getenv("ANDROID_NDK") == nullptr) {
       return fail(ExitCode::kUnsupported, "studio.package", "apk",
-                  "the script that makes Android apps is not installed with this program",
-                  "use `scripts/apk.sh` of ModAR's sources");
+                  "Google's NDK is missing, which compiles the app for phones",
+                  "unpack it, start the studio with ANDROID_NDK=FOLDER, or make the web page");
     }
     made.path = out + "/" + name + ".apk";
     made.commands = {{script, bundle, "--out", made.path}};

@@ -165,11 +165,15 @@ class Server(StudioTest):
         self.addCleanup(shutil.rmtree, tools)
         for tool in ("bash", "sh", "sed", "dirname", "head", "tr", "env", "python3", "cat", "grep", "mkdir", "pwd"):
             (tools / tool).symlink_to(shutil.which(tool))
-        studio = self.studio(env={"PATH": str(tools)})
+        studio = self.studio(env={"PATH": str(tools), "ANDROID_NDK": str(tools)})
         self.assertEqual(studio.job("api/bake", {})[0], "baked")
         name, told, _ = studio.job("api/export", {"kind": "apk"})
         self.assertEqual((name, told["code"]), ("failed", "studio.package"), told)
         self.assertIn("aapt", told["package"])
+        studio.end()
+        refused = self.studio().post("api/export", {"kind": "apk"})  # such an app would not start on any phone
+        self.assertEqual((refused.status, refused.json["code"]), (501, "studio.package"))
+        self.assertIn("ANDROID_NDK", refused.json["cure"])
 
     def test_200_models_and_100_pictures_open(self):
         for i in range(200):

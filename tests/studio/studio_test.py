@@ -348,7 +348,7 @@ class Page(StudioTest):
         while hand.run("fetch('api/project').then((answer) => answer.json()).then(({ bundle }) => bundle.stale)"):
             time.sleep(0.2)
         bundle = next((self.project / "out").glob("*.modar"))
-        [band, _] = self.modar_json("inspect", bundle)["patterns"]
+        band = next(one for one in self.modar_json("inspect", bundle)["patterns"] if one["name"] == "band")
         self.assertAlmostEqual(band["width_mm"], 110, delta=0.1)
 
     # ---- names and texts ----

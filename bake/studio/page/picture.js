@@ -117,14 +117,26 @@ function advice(pattern) {
 /** Attributes: pattern. What is chosen and not yet complete is kept here: a paper, a shape without its sizes. */
 export class Picture {
   oninit({ attrs }) {
-    this.rivals = setTimeout(() => loadRivals(attrs.pattern.name), RIVALS_AFTER_MS);
+    this.compare(attrs.pattern);
     this.paper = this.kind = null;
     this.shape = {};
     this.features = true;
   }
 
+  onupdate({ attrs }) {
+    this.compare(attrs.pattern);
+  }
+
   onremove() {
-    clearTimeout(this.rivals);
+    clearTimeout(this.timer);
+  }
+
+  compare({ name: pattern }) {
+    if (this.timer || state.rivals.has(pattern)) return;
+    this.timer = setTimeout(() => {
+      this.timer = 0;
+      loadRivals(pattern);
+    }, RIVALS_AFTER_MS);
   }
 
   /** The width and height of a sheet that lies as the picture does. */

@@ -58,7 +58,7 @@ const lookOf = ({ file, corners, width_mm: width, height_mm: height, kind, arc_d
 function take(project) {
   const before = state.project;
   state.project = project;
-  const looks = (patterns = []) => patterns.map((pattern) => pattern.name + lookOf(pattern)).join();
+  const looks = (patterns = []) => JSON.stringify(patterns.map(({ name, file, corners }) => [name, file, corners]));
   if (looks(before?.patterns) !== looks(project.patterns)) state.rivals.clear();
   for (const pattern of project.patterns) {
     const known = before?.patterns.find(({ name }) => name === pattern.name);
@@ -186,7 +186,11 @@ export async function loadScore(name) {
 
 /** What a phone may take a picture for, of the project's others. */
 export async function loadRivals(name) {
-  if (state.rivals.has(name) || state.project.patterns.length < 2) return;
+  if (state.rivals.has(name)) return;
+  if (state.project.patterns.length < 2) {
+    state.rivals.set(name, { found: [] });
+    return;
+  }
   const asked = { pending: true };
   state.rivals.set(name, asked);
   redraw();
