@@ -9,7 +9,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "bake/mesh/parallel_rays.hpp"
+#include "bake/mesh/rays/parallel_rays.hpp"
 
 namespace {
 

@@ -10,8 +10,8 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 
-#include "bake/mesh/parallel_rays.hpp"
-#include "bake/mesh/surface_cells.hpp"
+#include "bake/mesh/rays/parallel_rays.hpp"
+#include "bake/mesh/rays/surface_cells.hpp"
 #include "formats/base/parallel.hpp"
 
 namespace modar {

@@ -1,5 +1,5 @@
 // Rays of one direction, met triangle by triangle.
-#include "bake/mesh/parallel_rays.hpp"
+#include "bake/mesh/rays/parallel_rays.hpp"
 
 #include <algorithm>
 #include <cmath>

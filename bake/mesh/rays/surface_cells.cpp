@@ -1,5 +1,5 @@
 // Cells of a grid by a hash of their places.
-#include "bake/mesh/surface_cells.hpp"
+#include "bake/mesh/rays/surface_cells.hpp"
 
 #include <cmath>
 #include <utility>
