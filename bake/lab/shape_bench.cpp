@@ -8,6 +8,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "bake/pattern/box_edges.hpp"
 #include "bake/process/thread_clock.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/pose_loop.hpp"
@@ -66,6 +67,39 @@ GrayPicture cut_to(const GrayPicture& picture, double width, double height) {
   return out;
 }
 
+/// Lets a photo run over the edges of a box's sides, as bands and borders of cartons do: at an edge
+/// it is all that shows, from kBand of a side's length inwards nothing of it does. The place of a
+/// point of the box in the photo depends on where that lies in space, so that sides which share an
+/// edge show the same there.
+void run_around(const GrayPicture& photo, const std::array<double, 3>& box_mm,
+                std::array<GrayPicture, 6>& sides) {
+  constexpr double kBand = 0.12;
+  const auto [w, h, d] = box_mm;
+  const glm::dvec3 corners[] = {{0, 0, 0}, {w, 0, 0}, {w, 0, d}, {0, 0, d}, {0, 0, d}, {0, h, 0}};
+  const glm::dvec3 rights[] = {{w, 0, 0}, {0, 0, d}, {-w, 0, 0}, {0, 0, -d}, {w, 0, 0}, {w, 0, 0}};
+  const glm::dvec3 downs[] = {{0, h, 0}, {0, h, 0}, {0, h, 0}, {0, h, 0}, {0, 0, -d}, {0, 0, d}};
+  const double whole = w + h + d;
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    GrayPicture& side = sides[i];
+    for (int y = 0; y < side.height; ++y) {
+      for (int x = 0; x < side.width; ++x) {
+        const double u = (x + 0.5) / side.width;
+        const double v = (y + 0.5) / side.height;
+        const double inside = std::min({u, v, 1 - u, 1 - v}) / kBand;
+        if (inside >= 1) continue;
+        const glm::dvec3 p = corners[i] + u * rights[i] + v * downs[i];
+        const double across = (p.x + 0.7 * p.y + 0.4 * p.z) / whole;
+        const double down = (0.3 * p.x + 0.8 * p.y + p.z) / whole;
+        const auto at = static_cast<std::size_t>(down * (photo.height - 1)) *
+                            static_cast<std::size_t>(photo.width) +
+                        static_cast<std::size_t>(across * (photo.width - 1));
+        std::uint8_t& pixel = side.pixels[static_cast<std::size_t>(y * side.width + x)];
+        pixel = static_cast<std::uint8_t>(inside * pixel + (1 - inside) * photo.pixels[at]);
+      }
+    }
+  }
+}
+
 /// A side of a box cut from its photo with each edge 3 to 10 pixels too far in or out; what lies
 /// beyond the side is gray.
 GrayPicture crop_roughly(const GrayPicture& side, Random& random) {
@@ -103,6 +137,9 @@ Result<ShapedPattern> bake_on(const BenchShape& bench, const PoseBenchOptions& o
       MODAR_ASSIGN(const GrayPicture whole, load_pattern(path, shrunk));
       sides[i] = cut_to(whole, widths[i], heights[i]);
     }
+    const auto& around = options.patterns[(number + sides.size()) % options.patterns.size()];
+    MODAR_ASSIGN(const GrayPicture photo, load_pattern(around, shrunk));
+    run_around(photo, shape.box_mm, sides);
     ShapedPicture box = assemble_box(sides, shape.box_mm);
     pattern.picture = std::move(box.picture);
     pattern.section = std::move(box.section);
@@ -110,7 +147,7 @@ Result<ShapedPattern> bake_on(const BenchShape& bench, const PoseBenchOptions& o
     if (bench.cropped) {
       Random random(options.seed + number);
       for (GrayPicture& side : sides) side = crop_roughly(side, random);
-      pattern.picture = assemble_box(sides, shape.box_mm).picture;
+      pattern.picture = assemble_box(mend_crops(sides).pictures, shape.box_mm).picture;
     }
   } else {
     MODAR_ASSIGN(pattern.picture, load_pattern(options.patterns[number], shrunk));

@@ -6,6 +6,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "bake/pattern/box_edges.hpp"
 #include "bake/pattern/gray_mat.hpp"
 #include "bake/pattern/rectify.hpp"
 #include "bake/pattern/shape.hpp"
@@ -93,7 +94,11 @@ Result<ShapedPicture> load_box(const std::string& path, const ShapeRequest& requ
                     " pixels, which are not the proportions of its side of the box",
                 "cut it along the edges of its side, or correct size=WIDTHxHEIGHTxDEPTHmm");
   }
-  return assemble_box(pictures, request.box_mm);
+  const MendedBox mended = mend_crops(pictures);
+  ShapedPicture box = assemble_box(mended.pictures, request.box_mm);
+  box.mended = mended.most;
+  box.cut_beyond = mended.beyond;
+  return box;
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "bake/pattern/record.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "bake/pattern/picture.hpp"
 #include "bake/pattern/score.hpp"
@@ -49,6 +50,25 @@ Result<void> add_score(const std::string& path, const GrayImage& gray, unsigned 
 
 }  // namespace
 
+namespace {
+
+/// Says that pictures of a box's sides were not cut along its edges.
+void report_crops(const std::string& path, const ShapedPicture& shaped, Report& report) {
+  if (!(shaped.mended > 0)) return;
+  const auto tenths = static_cast<int>(std::lround(1000 * shaped.mended));
+  report.diagnostics.push_back(
+      {"pattern.crops",
+       shaped.cut_beyond ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo, path, 0,
+       "print that runs over the box's edges does not meet there: edges of the pictures were moved "
+       "by "
+       "up to " +
+           std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " % of a side" +
+           (shaped.cut_beyond ? ", some lie further off" : ""),
+       shaped.cut_beyond ? "cut the pictures again, along the edges of their sides" : ""});
+}
+
+}  // namespace
+
 Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
                                      std::span<const ParameterSetRecord> sets,
                                      const TrackerRecordOptions& options, Report& report,
@@ -62,6 +82,7 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
                                       "x" + std::to_string(gray.height) + " pixels",
                                   ""});
   }
+  report_crops(path, shaped, report);
   PatternFeatures out;
   out.name = file_stem(path);
   out.record.width = static_cast<std::uint32_t>(gray.width);

@@ -54,6 +54,8 @@ struct ShapedPicture {
   bool shrunk = false;             ///< see load_pattern()
   std::vector<std::byte> section;  ///< see shape_section()
   double width_mm = 0;
+  double mended = 0;        ///< of a box: see MendedBox
+  bool cut_beyond = false;  ///< the same
 };
 
 /// Reads a pattern's picture, or the pictures of a box side by side in one. width_mm: 0: what the
