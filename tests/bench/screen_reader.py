@@ -3,7 +3,8 @@
 
     screen_reader.py BUNDLE     makes a page of the bundle; prints a line for each thing: role, name, description, states
 Needs MODAR_BIN (build/release/bin by default) and a bus of its own: `dbus-run-session -- tests/bench/screen_reader.py BUNDLE`. Debian's packages
-at-spi2-core, python3-pyatspi, xvfb, and webkit2gtk-driver or firefox-esr.
+at-spi2-core, python3-pyatspi, xvfb, and webkit2gtk-driver or firefox-esr. WebKitGTK 2.50 tells nothing of a modal dialog in a shadow root, which
+the turntable is; Firefox tells all of it.
 """
 import os
 import pathlib
