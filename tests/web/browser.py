@@ -1,5 +1,6 @@
 """Chromium without a screen, driven by its DevTools protocol over a pair of pipes, and a server that can go away."""
 import base64
+import fcntl
 import functools
 import http.server
 import json
@@ -32,11 +33,10 @@ class Browser:
         commands_out, commands_in = os.pipe()
         answers_out, answers_in = os.pipe()
 
-        def wire():  # the protocol's ends are the descriptors 3 and 4; 10 and 11 are out of their way
-            os.dup2(commands_out, 10)
-            os.dup2(answers_in, 11)
-            os.dup2(10, 3)
-            os.dup2(11, 4)
+        def wire():  # the protocol's ends are the descriptors 3 and 4; copies are out of their way
+            ends = [fcntl.fcntl(end, fcntl.F_DUPFD, 10) for end in (commands_out, answers_in)]
+            os.dup2(ends[0], 3)
+            os.dup2(ends[1], 4)
 
         words = [CHROMIUM, *FLAGS, f"--user-data-dir={folder}", f"--window-size={size[0]},{size[1]}",
                  f"--use-file-for-fake-video-capture={video}", *extra, "about:blank"]

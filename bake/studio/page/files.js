@@ -120,7 +120,7 @@ function modelCard(model) {
 
 /** What models name and the folder lacks, where it is seen at once. */
 const lacking = () => state.project.models.filter(({ missing }) => missing.length).map((model) => m('div.lacking', { key: model.name },
-  finding({ text: [name(model.name), ': ', t('missing', { files: model.missing.join(', ') })], cure: t('missingCure') }, m('p', chooser(t('chooseIt'), { kind: '.quiet.small' })))));
+  finding({ text: [name(model.name), ' – ', t('missing', { files: model.missing.join(', ') })], cure: t('missingCure') }, m('p', chooser(t('chooseIt'), { kind: '.quiet.small' })))));
 
 const welcome = () => m('div.welcome', m('div.art', { 'aria-hidden': 'true' }, icon('picture'), icon('add'), icon('model')),
   head(t('welcome'), t('welcomeLead')), m('p.row', chooser(t('chooseFiles'), { kind: '.primary' }), chooser(t('chooseFolder'), { folder: true, kind: '.quiet' })),
@@ -136,10 +136,9 @@ const group = (title, count, cards, empty) => m('section.group', m('h2', title, 
 
 function whatNext() {
   const { models, patterns } = state.project;
-  if (missingFiles().length) return null;
   if (!patterns.length) return m('p.next-words', t('nextPhoto'));
   if (!models.length) return m('p.next-words', t('nextModel'));
-  return m('a.button.primary', { href: `#/picture/${encodeURIComponent(patterns[0].name)}` }, m('span', t('toPicture')), icon('next'));
+  return m(`a.button${missingFiles().length ? '.quiet' : '.primary'}`, { href: `#/picture/${encodeURIComponent(patterns[0].name)}` }, m('span', t('toPicture')), icon('next'));
 }
 
 export const Files = {
