@@ -19,7 +19,7 @@ constexpr double kMostMended = 0.03;  // share of a side by which an edge is mov
 constexpr double kShiftStep = 0.005;  // shares that are tried, then refined by a quarter
 constexpr int kShiftSteps = 14;       // to either side: two edges, both cut too far in or out
 // Correlation, at the best shift, from which print runs over an edge.
-constexpr double kAlike = 0.85;
+constexpr double kEdgesAlike = 0.85;
 constexpr double kLeastContrast = 30;  // variance
 // Edges that must agree. Of 24 boxes of unrelated pictures print seemed to run over none, but over
 // one of a box of made textures.
@@ -222,7 +222,7 @@ MendedBox mend_crops(const std::array<GrayPicture, 6>& pictures) {
       continue;
     }
     const EdgeShift shift = shift_of(pictures, edge);
-    if (shift.alike >= kAlike) equations.push_back(equations_of(edge, shift));
+    if (shift.alike >= kEdgesAlike) equations.push_back(equations_of(edge, shift));
   }
   auto crops = solve(equations);
   std::erase_if(equations, [&](const auto& edge) { return residual(edge, crops) > kContradicts; });

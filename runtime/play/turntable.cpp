@@ -95,38 +95,30 @@ Subject pattern_subject(const BundleView& bundle, std::uint32_t pattern) {
   Subject subject{bundle.name(bundle.patterns()[pattern].name), 0, {}};
   add_items(bundle, ActionMachine(bundle), pattern, glm::mat4(1.0f), subject.items);
   for (const DrawItem& item : subject.items) {
-    for (const float x : {-1.0f, 1.0f}) {
-      for (const float y : {-1.0f, 1.0f}) {
-        const glm::vec3 corner(item.to_eye * glm::vec4(x, y, 0.0f, 1.0f));
-        subject.radius = std::max(subject.radius, static_cast<double>(glm::length(corner)));
-      }
-    }
+    const glm::mat4& place = item.to_eye;  // of a square from -1 to 1
+    const float half = glm::dot(place[0], place[0]) + glm::dot(place[1], place[1]);
+    const float radius = glm::length(glm::vec3(place[3])) + std::sqrt(half);
+    subject.radius = std::max(subject.radius, static_cast<double>(radius));
   }
   return subject;
 }
 
-std::vector<Subject> subjects_of(const BundleView& bundle) {
-  std::vector<Subject> subjects;
-  for (std::uint32_t i = 0; i < bundle.models().size(); ++i) {
-    subjects.push_back(model_subject(bundle, i));
-  }
-  if (!subjects.empty()) return subjects;
-  for (std::uint32_t i = 0; i < bundle.patterns().size(); ++i) {
-    Subject subject = pattern_subject(bundle, i);
-    if (!subject.items.empty()) subjects.push_back(std::move(subject));
-  }
-  return subjects;
+/// The n-th model; of a bundle without models the n-th pattern, whose items may be none.
+Subject subject_of(const BundleView& bundle, std::uint32_t n) {
+  return bundle.models().empty() ? pattern_subject(bundle, n) : model_subject(bundle, n);
 }
 
 }  // namespace
 
 Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle) {
   constexpr double kFps = 30;
-  const std::vector<Subject> subjects = subjects_of(bundle);
-  if (subjects.empty()) {
+  const bool models = !bundle.models().empty();
+  const std::size_t count = models ? bundle.models().size() : bundle.patterns().size();
+  std::uint32_t first = 0;
+  while (first < count && subject_of(bundle, first).items.empty()) ++first;
+  if (first == count) {
     return fail(ExitCode::kInvalidInput, "play.no-models", options.bundle,
-                "the bundle holds no model, and no picture or video that is shown at first",
-                "bake it with --model FILE");
+                "it holds no model, and shows no picture at first", "bake it with --model FILE");
   }
   MODAR_ASSIGN(std::unique_ptr<Screen> screen, Screen::open(bundle, options));
   MODAR_ASSIGN(std::unique_ptr<FrameSink> sink, open_frame_sink(options.out, kFps));
@@ -134,18 +126,20 @@ Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle
 
   const Camera camera = default_camera(options.width, options.height);
   TurntableReport turn;
-  turn.pattern = bundle.models().empty();
+  turn.pattern = !models;
   FrameReport report;
-  for (const Subject& subject : subjects) {
+  for (std::uint32_t n = first; n < count; ++n) {
+    const Subject subject = subject_of(bundle, n);
+    if (subject.items.empty()) continue;
     const double distance = distance_of(camera, subject.radius);
     turn.name = subject.name;
+    std::vector<DrawItem> items = subject.items;
     for (int i = 0; i < options.turntable; ++i) {
       turn.angle_deg = 360.0 * i / options.turntable;
       const glm::mat4 view = turned(turn.angle_deg, distance);
-      std::vector<DrawItem> items = subject.items;
-      for (DrawItem& item : items) {
-        item.to_eye = view * item.to_eye;
-        item.world_to_eye = view * item.world_to_eye;
+      for (std::size_t k = 0; k < items.size(); ++k) {
+        items[k].to_eye = view * subject.items[k].to_eye;
+        items[k].world_to_eye = view * subject.items[k].world_to_eye;
       }
       const std::int64_t before = now_ns();
       screen->draw({}, camera, items);
