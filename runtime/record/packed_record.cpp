@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <memory>
 #include <string>
 #include <utility>
 
+#include "formats/transport/coded_bytes.hpp"
 #include "runtime/record/record_parts.hpp"
 
 namespace modar {
@@ -280,7 +282,7 @@ bool good_side(int side) {
 }
 
 /// packed: as long as the whole, of which the header is there.
-Result<PackedHeader> header_of(std::span<const std::byte> packed) {
+Result<PackedHeader> packed_header(std::span<const std::byte> packed) {
   PackedHeader header{};
   if (packed.size() < sizeof header) return broken("it ends in its header");
   std::memcpy(&header, packed.data(), sizeof header);
@@ -326,19 +328,24 @@ std::optional<std::vector<std::byte>> pack_tracker_record(std::span<const std::b
   return packed;
 }
 
+RecordUnpacker::RecordUnpacker(std::span<const std::byte> packed) : packed_(packed) {}
+RecordUnpacker::RecordUnpacker(RecordUnpacker&&) noexcept = default;
+RecordUnpacker& RecordUnpacker::operator=(RecordUnpacker&&) noexcept = default;
+RecordUnpacker::~RecordUnpacker() = default;
+
 void RecordUnpacker::go_on(std::size_t there) {
   if (there < sizeof(PackedHeader)) return;
   if (!picture_) {
-    const auto header = header_of(packed_);
+    const auto header = packed_header(packed_);
     if (!header) return;  // finish() tells
-    picture_.emplace(packed_.subspan(sizeof *header, header->picture_size), header->width,
-                     header->height);
+    picture_ = std::make_unique<PictureDecoder>(
+        packed_.subspan(sizeof *header, header->picture_size), header->width, header->height);
   }
   picture_->go_on(there - sizeof(PackedHeader));
 }
 
 Result<std::vector<std::byte>> RecordUnpacker::finish() {
-  MODAR_ASSIGN(const PackedHeader header, header_of(packed_));
+  MODAR_ASSIGN(const PackedHeader header, packed_header(packed_));
   go_on(packed_.size());
   auto pixels = picture_->finish();
   if (!pixels) return broken("its picture ends too early");

@@ -3,14 +3,16 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "formats/base/error.hpp"
-#include "formats/transport/coded_bytes.hpp"
 
 namespace modar {
+
+class PictureDecoder;
 
 /// A record of make_tracker_record(), packed: about a quarter of its bytes. Nothing where unpacking
 /// would not give back these very bytes: a record that another program made, or other options did.
@@ -25,7 +27,10 @@ Result<std::vector<std::byte>> unpack_tracker_record(std::span<const std::byte> 
 class RecordUnpacker {
  public:
   /// packed: memory for all of the bytes, which outlives this.
-  explicit RecordUnpacker(std::span<const std::byte> packed) : packed_(packed) {}
+  explicit RecordUnpacker(std::span<const std::byte> packed);
+  RecordUnpacker(RecordUnpacker&&) noexcept;
+  RecordUnpacker& operator=(RecordUnpacker&&) noexcept;
+  ~RecordUnpacker();
   /// Decodes what the first `there` bytes hold of the picture.
   void go_on(std::size_t there);
   /// All bytes are there. Errors: as of unpack_tracker_record().
@@ -33,7 +38,7 @@ class RecordUnpacker {
 
  private:
   std::span<const std::byte> packed_;
-  std::optional<PictureDecoder> picture_;
+  std::unique_ptr<PictureDecoder> picture_;
 };
 
 }  // namespace modar
