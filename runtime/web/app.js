@@ -1,4 +1,5 @@
 // The page around <modar-viewer>: a cover, languages, photos and films to share, what is kept on the device.
+import { Source } from './arrival.js';
 import { Camera } from './camera.js';
 import { forgetInstalled, installedBundles, installedFile } from './installed.js';
 import './modar-viewer.js';
@@ -16,6 +17,8 @@ const viewer = $('viewer');
 const SCOPE = new URL('./', location).href;
 
 const KEPT_LANGUAGE = 'modar-language';
+/** Bundles that this visit brings, for sw.js, which takes them from here. */
+const BROUGHT = `modar ${SCOPE} brought`;
 /** Pictures of the visitor's own. */
 const OWN_CACHE = `modar own ${SCOPE}`;
 
@@ -27,6 +30,8 @@ let words;
 let recorder = null;
 /** The promise of the bundle that is loaded before the visitor starts. */
 let loading = null;
+/** Until the copy of a bundle that comes is written or given up. */
+let brought = null;
 /** Until what is kept on the device is whole; and whether the visitor has deleted it since the page was opened. */
 let keeping = null;
 let forgotten = false;
@@ -106,10 +111,25 @@ async function chooseBundles() {
   $('choice').hidden = site.bundles.length < 2;
 }
 
+const canKeep = () => !forgotten && 'serviceWorker' in navigator && globalThis.isSecureContext;
+
+/**
+ * Writes a bundle that comes into BROUGHT: the browser's own cache does not hold what was asked for by ranges, and the service worker
+ * would bring it a second time. As a stream, which takes no memory of the page's. null: a service worker has the bundle, or none will.
+ */
+function copyOf(address) {
+  if (!canKeep() || navigator.serviceWorker.controller) return null;
+  let to;
+  const drop = () => { to = null; };
+  const body = new ReadableStream({ start(controller) { to = controller; }, cancel: drop });
+  brought = caches.open(BROUGHT).then((cache) => cache.put(address, new Response(body))).catch(drop);
+  return { add: (bytes) => to?.enqueue(bytes), end: (whole) => (whole ? to?.close() : to?.error()) };
+}
+
 /** Where a bundle's bytes come from, the same each time. */
 function sourceOf(bundle) {
   const bytesOf = async () => await (await installedFile(SCOPE, bundle.file))?.arrayBuffer() ?? new ArrayBuffer(0);
-  return bundle.source ??= bundle.installed ? bytesOf : bundle.file;
+  return bundle.source ??= bundle.installed ? bytesOf : () => new Source(bundle.file, copyOf(bundle.file));
 }
 
 /** The chosen bundle, once: begun before the visitor starts, and waited for then. */
@@ -307,7 +327,7 @@ async function forget() {
 
 /** Keeps the page for visits without a network, once it has what it needs now. */
 function keep() {
-  if (forgotten || !('serviceWorker' in navigator) || !globalThis.isSecureContext) return;
+  if (!canKeep()) return;
   keeping = navigator.serviceWorker.register('sw.js').then(({ active }) => active && new Promise((resolve) => {
     const { port1, port2 } = new MessageChannel();
     port1.onmessage = resolve;
@@ -318,4 +338,4 @@ function keep() {
 adopt(document, BASE);
 listen();
 const prepared = prepare();
-prepared.catch(tellUnprepared).then(() => loading).then(() => viewer.whole).catch(() => {}).then(keep);
+prepared.catch(tellUnprepared).then(() => loading).then(() => viewer.whole).then(() => brought).catch(() => {}).then(keep);

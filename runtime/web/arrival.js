@@ -37,7 +37,7 @@ export class Source {
   /** Its bytes were given, not its address. */
   #given;
   #abort = new AbortController();
-  #onProgress;
+  #copy;
   #reader = null;
   /** Came, and was not taken. */
   #chunk = new Uint8Array();
@@ -49,14 +49,19 @@ export class Source {
   total = 0;
   /** While it is true, what does not come is waited for. */
   patient = false;
+  /** (taken, total) is told what was taken, bytes. */
+  onProgress = null;
 
-  /** bundle: an address, or bytes. */
-  constructor(bundle, onProgress) {
+  /**
+   * bundle: an address, or bytes. copy: add(bytes) is given what is taken, in order, and does not change it; then end(whole) is called
+   * once. whole: those bytes are all of a packed bundle, and verified.
+   */
+  constructor(bundle, copy = null) {
     this.#given = typeof bundle !== 'string' && !(bundle instanceof URL);
     this.#bundle = this.#given ? new Uint8Array(bundle) : bundle;
     const first = this.#given ? 0 : Number(/[?&]first=(\d+)/.exec(bundle)?.[1] ?? 0);
     if (first > 0) this.#stops = [Math.min(START, first), first];
-    this.#onProgress = onProgress;
+    this.#copy = copy;
   }
 
   #failed(cause) {
@@ -145,7 +150,8 @@ export class Source {
       if (onPart && part.length < count) onPart(size, part);
       size += part.length;
       this.#taken += part.length;
-      this.#onProgress?.(this.#taken, Math.max(this.total, this.#taken));
+      this.#copy?.add(part);
+      this.onProgress?.(this.#taken, Math.max(this.total, this.#taken));
     }
     if (parts.length === 1) return parts[0].slice();
     return new Uint8Array(await new Blob(parts).arrayBuffer());
@@ -153,6 +159,7 @@ export class Source {
 
   /** Bytes that came before, once more. */
   async again(from, count) {
+    this.#endCopy(false);  // it has what was no good
     const other = new Source(this.#bundle);
     other.#abort = this.#abort;
     other.#taken = from;
@@ -163,8 +170,15 @@ export class Source {
     }
   }
 
-  close() {
+  #endCopy(whole) {
+    this.#copy?.end(whole);
+    this.#copy = null;
+  }
+
+  /** whole: what was taken is verified. */
+  close(whole = false) {
     this.#abort.abort();
+    this.#endCopy(whole && this.#taken === this.total);
   }
 }
 
@@ -254,11 +268,11 @@ export class Arrival {
     if (stage === STAGE.show) this.#source.patient = true;  // a visitor sees something, and waits for no more
     if (this.#next < this.#pieces.length) return;
     await this.#source.take(1, false).catch(() => {});  // to its end: then the browser keeps it
-    this.close();
+    this.close(true);
   }
 
-  close() {
-    this.#source.close();
+  close(whole = false) {
+    this.#source.close(whole);
     this.#decoder.close();
   }
 }

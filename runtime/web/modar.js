@@ -217,7 +217,8 @@ export class Modar extends EventTarget {
     // The engine is compiled while the bundle comes.
     const prepared = modar.#tracker.ask({ type: 'prepare' });
     prepared.catch(() => {});  // told below
-    const source = new Source(bundle, onProgress);
+    const source = bundle instanceof Source ? bundle : new Source(bundle);
+    source.onProgress = onProgress;
     try {
       const start = await source.take(8, false);
       let opening;
@@ -235,6 +236,7 @@ export class Modar extends EventTarget {
       const { patterns, scenes, kind } = await modar.#tracker.ask({ type: 'open', ...opening[0] }, opening[1]);
       Object.assign(modar, { patterns, scenes, kind });
     } catch (error) {
+      source.close();
       modar.close();
       throw error;
     }

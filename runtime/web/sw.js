@@ -4,6 +4,7 @@
 const OURS = `modar ${self.registration.scope} `;  // other sites may live on the same host
 const CACHE = OURS + SITE.hash;
 const INSTALLED = `${OURS}installed`;  // by updates, see installed.js
+const BROUGHT = `${OURS}brought`;  // bundles that a first visit has brought, see app.js
 /** As in engine.js: of the two builds of the engine, only the one that will run is kept. */
 const SIMD = WebAssembly.validate(Uint8Array.of(
   0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 8, 1, 6, 0, 65, 0, 253, 15, 11));
@@ -15,7 +16,14 @@ async function keepAll() {
   // same wherever it lies, and the page has just loaded it.
   const cacheOf = (file) => (file.includes('?v=') ? 'force-cache' : 'no-cache');
   const requests = ['./', ...files].map((file) => new Request(file, { cache: cacheOf(file) }));
-  await (await caches.open(CACHE)).addAll(requests);
+  const cache = await caches.open(CACHE);
+  const missing = [];
+  for (const request of requests) {
+    const there = await caches.match(request, { cacheName: BROUGHT });
+    if (there) await cache.put(request, there);
+    else missing.push(request);
+  }
+  await cache.addAll(missing);
 }
 
 self.addEventListener('install', (event) => event.waitUntil(keepAll()));
@@ -23,7 +31,7 @@ self.addEventListener('install', (event) => event.waitUntil(keepAll()));
 // A visitor may have deleted what was stored, and come back.
 self.addEventListener('message', (event) => event.waitUntil(
   caches.has(CACHE).then((kept) => kept || keepAll()).catch(() => caches.delete(CACHE))
-    .then(() => event.ports[0]?.postMessage('done'))));
+    .then(() => caches.delete(BROUGHT)).then(() => event.ports[0]?.postMessage('done'))));
 
 self.addEventListener('activate', (event) => {
   event.waitUntil(caches.keys().then((names) => Promise.all(

@@ -1,5 +1,6 @@
 """Packed bundles in a browser: drawn as the raw ones are, refined on the way, and put together from damaged downloads."""
 import functools
+import hashlib
 import http.server
 import json
 import pathlib
@@ -77,11 +78,15 @@ def flipped(data, at):
 
 
 class Host(Quiet):
-    """Answers of /KIND/demo.packed are damaged in that way: each, or the first alone."""
+    """Answers of /KIND/demo.packed are damaged in that way: each, or the first alone. The pages of VISITS are the site's."""
+
+    VISITS = ("visited", "mended")
 
     def do_GET(self):
         kind, _, name = urllib.parse.urlsplit(self.path).path.lstrip("/").partition("/")
-        if name != "demo.packed":
+        if not name.endswith("demo.packed"):
+            if kind in self.VISITS:
+                self.path = "/" + name
             return super().do_GET()
         whole = self.server.packed
         asked = self.server.asked.setdefault(kind, [])
@@ -95,6 +100,7 @@ class Host(Quiet):
             "version": lambda: flipped(whole, 9),
             "count": lambda: whole[:12] + b"\xff\xff\xff\xff" + whole[16:],
             "swapped": lambda: whole[:a] + whole[b:b + b_size] + whole[a:a + a_size] + whole[b + b_size:] if first else whole,
+            "mended": lambda: flipped(whole, b + b_size // 2) if len(asked) <= 3 else whole,
             "forged": lambda: flipped(whole, b + b_size // 2),
         }
         body = damage.get(kind, lambda: whole)()
@@ -107,12 +113,14 @@ class Host(Quiet):
         self.send_response(206 if ranged else 200)
         self.send_header("Content-Type", "application/octet-stream")
         self.send_header("Content-Length", str(len(part) if kind != "short" or cut is None else cut))
-        self.send_header("Cache-Control", "no-store")
+        if kind not in self.VISITS:
+            self.send_header("Cache-Control", "no-store")
         if ranged:
             self.send_header("Content-Range", f"bytes {start}-{end}/{len(body)}")
         self.end_headers()
         try:
             self.wfile.write(part[:cut])
+            self.server.sent[kind] = self.server.sent.get(kind, 0) + len(part[:cut])
             if cut:
                 time.sleep(0.3)  # a browser drops what it has not handed on yet
         except OSError:
@@ -135,6 +143,7 @@ class Arrival(ProgramTest):
                 raise AssertionError(done.stderr)
         cls.http = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Host, directory=str(site)))
         cls.http.packed, cls.http.asked = (site / "bundles" / "demo.packed").read_bytes(), {}
+        cls.http.sent = {}
         cls.raw = (site / "bundles" / "demo.modar").stat().st_size
         pieces = pieces_of(cls.http.packed)
         cls.pieces = pieces
@@ -175,6 +184,31 @@ class Arrival(ProgramTest):
             drawn = self.draw(f"'/{kind}/demo.packed?first={first}'")
             self.assertEqual((drawn.get("whole"), drawn["refined"]), (self.wanted["whole"], 2))
             self.assertEqual(self.http.asked.pop(kind)[-len(asked):], asked)
+
+    def visit(self, kind):
+        """A first visit, until the service worker keeps the page: requests of the bundle, their bytes, and what is kept."""
+        self.addCleanup(self.browser.open, f"http://localhost:{self.http.server_port}/site.json")
+        self.browser.open(f"http://localhost:{self.http.server_port}/{kind}/")
+        self.browser.wait("navigator.serviceWorker.ready.then(({ active }) => active.state === 'activated')", "the service worker")
+        kept = self.browser.run("""(async () => {
+          const names = (await caches.keys()).filter((name) => name.includes(location.pathname));
+          const bundle = await (await caches.open(names[0])).match('bundles/demo.packed', { ignoreSearch: true });
+          const hash = new Uint8Array(await crypto.subtle.digest('SHA-256', await bundle.arrayBuffer()));
+          return [names.length, Array.from(hash, (byte) => byte.toString(16).padStart(2, '0')).join('')];
+        })()""")
+        self.assertEqual(kept, [1, hashlib.sha256(self.http.packed).hexdigest()])
+        return self.http.asked[kind], self.http.sent[kind]
+
+    def test_a_first_visit_brings_the_bundle_once_by_ranges(self):
+        first = next(at for at, _, stage in self.pieces if stage == 3)
+        staged = ["bytes=0-40959", f"bytes=40960-{first - 1}", f"bytes={first}-"]
+        asked, sent = self.visit("visited")
+        print(f"a first visit, with what the service worker fetches: {len(asked)} requests, {sent} bytes of a bundle of {len(self.http.packed)}")
+        self.assertEqual((asked, sent), (staged, len(self.http.packed)))
+        # Of what was damaged on the way, no copy is kept: the worker brings its own.
+        asked, _ = self.visit("mended")
+        self.assertEqual(asked[:-1], [*staged, f"bytes={self.http.swapped[1][0]}-"])
+        self.assertIn(asked[-1], (None, "bytes=0-"))  # the browser's own range, of what it has in part
 
     def test_bytes_in_hand_and_lost_contexts(self):
         bytes_of = "await (await fetch('/bundles/demo.packed')).arrayBuffer()"
