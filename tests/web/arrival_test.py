@@ -189,6 +189,8 @@ class Arrival(ProgramTest):
         """A first visit, until the service worker keeps the page: requests of the bundle, their bytes, and what is kept."""
         self.addCleanup(self.browser.open, f"http://localhost:{self.http.server_port}/site.json")
         self.browser.open(f"http://localhost:{self.http.server_port}/{kind}/")
+        engine = "performance.getEntriesByType('resource').find(({ name }) => name.endsWith('/engine-simd.wasm'))"
+        self.browser.wait(f"{engine}?.initiatorType === 'link'", "what index.html asks for before any script does", 30)
         self.browser.wait("navigator.serviceWorker.ready.then(({ active }) => active.state === 'activated')", "the service worker")
         kept = self.browser.run("""(async () => {
           const names = (await caches.keys()).filter((name) => name.includes(location.pathname));
