@@ -105,9 +105,10 @@ Result<void> show_other(const Session& session, const Error& busy,
   return {};
 }
 
-void tell_project(Session& session) {
+/// files: something that a bake may read was written by hand.
+void tell_project(Session& session, bool files) {
   const auto state = session.text.read();
-  session.events.publish("project", {{"revision", state ? state->revision : ""}});
+  session.events.publish("project", {{"revision", state ? state->revision : ""}, {"files", files}});
 }
 
 }  // namespace
@@ -148,7 +149,7 @@ Result<void> run_studio(const StudioOptions& options,
   };
   MODAR_TRY(write_private(session.own + "/address", server->address()));
   {
-    const Watcher watcher(folder, [&session] { tell_project(session); });
+    const Watcher watcher(folder, [&session](bool files) { tell_project(session, files); });
     ready({server->address(), server->opening_address()});
     if (ended) server->stop();
     server->serve();

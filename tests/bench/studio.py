@@ -6,7 +6,7 @@
 Prints JSON, medians in ms: first_page (an empty folder, until its first screen is drawn), open (a project of 200 models and 100 pictures,
 until its cards are there), scroll_frame (while that list is scrolled from end to end), corner (a dragged corner, until the
 rectified preview is drawn) and handle (a dragged handle, until the model is drawn: the event's own time); corner_worst and handle_worst
-are the worst.
+are the worst. changed: from a model that is written by hand until the stage draws it, less the bake's own time as its event tells it.
 
 Needs a release build's modar in MODAR_BIN_DIR (default: build/release/bin), chromium, and the page's engine (preset `web`).
 """
@@ -18,6 +18,7 @@ import shutil
 import statistics
 import sys
 import tempfile
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 os.environ.setdefault("MODAR_BIN_DIR", str(ROOT / "build" / "release" / "bin"))
@@ -102,6 +103,33 @@ def handle(hand):
     return [ms for ms, _ in hand.run("seen.drawn")][2:]
 
 
+FOLLOW = """(() => {
+  globalThis.bakes = [];
+  const events = new EventSource('api/events');
+  events.addEventListener('baked', ({ data }) => bakes.push(JSON.parse(data).seconds));
+  globalThis.drawnBy = 0;
+  new MutationObserver((changes) => {
+    if (changes.some(({ removedNodes }) => [...removedNodes].some(({ nodeName }) => nodeName === 'CANVAS'))) drawnBy = Date.now();
+  }).observe(document.querySelector('.layers'), { childList: true });
+})()"""
+
+
+def changed(hand, model, runs):
+    """A model is written again; the stage shows the bake of it once its old layers go."""
+    hand.settle()
+    hand.run(FOLLOW)
+    waits = []
+    for i in range(runs):
+        hand.run("drawnBy = 0")
+        start = time.time()
+        with model.open("a") as file:
+            file.write(f"# {i}\nv {i} 0 0\n")
+        hand.wait("drawnBy && bakes.length", "the bake on the stage")
+        waits.append(hand.run("drawnBy") - 1000 * start - 1000 * hand.run("bakes.pop()"))
+        hand.settle()
+    return waits
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--models", type=int, default=200)
@@ -124,9 +152,11 @@ def main():
         hand.run(WATCH)
         waits = corner(hand, 4 * options.runs)
         drawn = handle(hand)
+        followed = changed(hand, project / "pottery.obj", options.runs)
         hand.close()
         studio.end()
-    figures |= {"corner": statistics.median(waits), "corner_worst": max(waits), "handle": statistics.median(drawn), "handle_worst": max(drawn)}
+    figures |= {"corner": statistics.median(waits), "corner_worst": max(waits), "handle": statistics.median(drawn), "handle_worst": max(drawn),
+                "changed": statistics.median(followed)}
     print(json.dumps({key: round(value, 1) for key, value in figures.items()}, indent=1))
 
 

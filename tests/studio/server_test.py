@@ -85,7 +85,13 @@ class Server(StudioTest):
         events = Events(studio)
         (self.folder / "modar.toml").write_text(QUICK + SCENE + "# mine\n")
         name, told, _ = events.until({"project"}, 90)
-        self.assertEqual(told["revision"], studio.project()["revision"])
+        self.assertEqual((told["revision"], told["files"]), (studio.project()["revision"], False))
+        events.close()
+        events = Events(studio)
+        with (self.folder / "pottery.obj").open("a") as file:
+            file.write("# mine\n")
+        _, told, _ = events.until({"project"}, 90)  # by which the page knows that there is something to bake
+        self.assertEqual((told["revision"], told["files"]), (studio.project()["revision"], True))
         events.close()
 
     def test_corners_previews_thumbs_and_grades(self):

@@ -164,8 +164,8 @@ async function begin() {
   dropping();
   shortcuts();
   try {
-    await load();
     listen();
+    await load();
     if (!location.hash) location.replace(addressOf('files'));
   } catch (error) {
     state.gone = true;

@@ -1,8 +1,11 @@
 // The project as the server has it, and every change of it: one place, so that undo, the file on disk and what is shown agree.
 import { ask, askJson, pathOf, Refused } from './api.js';
 
-/** Milliseconds without a change after which the bundle is baked anew: trades an answer soon against bakes that are thrown away. */
-const BAKE_AFTER_MS = 300;
+/**
+ * Milliseconds without a change after which the bundle is baked anew: trades an answer soon against bakes that are thrown away. What is
+ * changed here is drawn at once, and followed by more; of what is changed by hand, the bake is what shows it.
+ */
+const BAKE_AFTER_MS = { here: 300, byHand: 50 };
 
 export const state = {
   project: null,
@@ -55,7 +58,7 @@ export const isBakeable = () => (state.project?.scenes.length ?? 0) > 0;
 const lookOf = ({ file, corners, width_mm: width, height_mm: height, kind, arc_deg: arc, top_mm: top, bottom_mm: bottom, box_mm: box }) =>
   JSON.stringify([file, corners, width, height, kind, arc, top, bottom, box]);
 
-function take(project) {
+function take(project, where = 'here') {
   const before = state.project;
   state.project = project;
   const looks = (patterns = []) => JSON.stringify(patterns.map(({ name, file, corners }) => [name, file, corners]));
@@ -64,12 +67,12 @@ function take(project) {
     const known = before?.patterns.find(({ name }) => name === pattern.name);
     if (!known || lookOf(known) !== lookOf(pattern)) state.scores.delete(pattern.name);
   }
-  if ((project.bundle.stale || !project.bundle.baked) && !state.failure && !halted && isBakeable()) bakeSoon();
+  if ((project.bundle.stale || !project.bundle.baked) && !state.failure && !halted && isBakeable()) bakeSoon(where);
   redraw();
 }
 
 export async function load() {
-  take(await askJson('GET', 'project'));
+  take(await askJson('GET', 'project'), 'byHand');
 }
 
 /** Changes wait for one another: each names the revision that the one before has made. */
@@ -147,10 +150,13 @@ export async function addFiles(files, onProgress) {
   return told;
 }
 
-/** What runs already is ended where it makes what is no longer wanted, and waited for where it is something else: it ends with an event. */
-async function bake() {
+/**
+ * What runs already is ended where it makes what is no longer wanted, and waited for where it is something else or where files have changed
+ * meanwhile, which may have nothing to do with it: it ends with an event.
+ */
+async function bake(where) {
   try {
-    if (state.progress?.kind === 'bake') await ask('DELETE', 'job');
+    if (state.progress?.kind === 'bake' && where === 'here') await ask('DELETE', 'job');
     else if (!state.progress) {
       state.progress = { kind: 'bake', stage: '', done: 0 };
       redraw();
@@ -162,9 +168,19 @@ async function bake() {
   }
 }
 
-function bakeSoon() {
+function bakeSoon(where) {
   clearTimeout(bakeTimer);
-  bakeTimer = setTimeout(bake, BAKE_AFTER_MS);
+  bakeTimer = setTimeout(() => bake(where), BAKE_AFTER_MS[where]);
+}
+
+/** A bake that read a file while it was written is made again. */
+const lasting = (failure) => (failure?.code === 'project.changing' ? null : failure);
+
+/** modar.toml or what it names has been changed by hand: what failed or was cancelled before may do now. */
+function follow() {
+  if (state.failure?.kind === 'bake') state.failure = null;
+  halted = false;
+  queued(load).catch(tellError);
 }
 
 export async function cancel() {
@@ -216,13 +232,16 @@ export function listen() {
     redraw();
   });
   on('progress', (progress) => { state.progress = progress; });
-  on('project', ({ revision }) => { if (revision !== state.project?.revision) queued(load).catch(tellError); });
+  on('project', ({ revision, files = false }) => { if (files || revision !== state.project?.revision) follow(); });
   on('baked', ({ findings = [], errors = [] }) => {
-    Object.assign(state, { progress: null, failure: errors.length ? { kind: 'bake', ...errors[0] } : null, findings });
+    Object.assign(state, { progress: null, failure: lasting(errors.length ? { kind: 'bake', ...errors[0] } : null), findings });
     ++state.baked;
     queued(load).catch(tellError);
   });
-  on('failed', (failure) => Object.assign(state, { progress: null, failure }));
+  on('failed', (failure) => {
+    Object.assign(state, { progress: null, failure: lasting(failure) });
+    if (!state.failure) queued(load).catch(tellError);
+  });
   on('cancelled', () => {
     state.progress = null;
     queued(load).catch(tellError);
@@ -237,8 +256,9 @@ export function listen() {
     state.gone = true;
     redraw();
   };
-  events.onopen = () => {  // also after a while without the server, when much may have changed
-    state.gone = false;
+  events.onopen = () => {
+    if (!state.gone) return;
+    state.gone = false;  // after a while without the server much may have changed
     queued(load).catch(tellError);
   };
 }
