@@ -277,11 +277,15 @@ export class View extends EventTarget {
 
   #restore(webgl1) {
     this.#gl = openContext(this.#models, webgl1);
-    this.#lost = false;
-    this.#engine.useContext(this.#gl.context, this.#gl.version);
-    if (this.#empty) return;
-    this.#engine.upload(!this.#stale, this.#fixedLight);
-    this.#stale = false;
+    const { context, version } = this.#gl;
+    try {
+      this.#engine.useContext(context, version);
+      if (!this.#empty) this.#engine.upload(!this.#stale, this.#fixedLight);
+    } catch (error) {
+      if (context.isContextLost()) return;  // again: the next one will do
+      throw error;
+    }
+    this.#lost = this.#stale = false;
     this.#media.forget();
   }
 
