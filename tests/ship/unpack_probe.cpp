@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "formats/bundle_view.hpp"
+#include "formats/check.hpp"
 #include "modar/arriving_bundle.hpp"
 #include "modar/mapped_file.hpp"
 
