@@ -11,6 +11,8 @@
 namespace modar {
 namespace {
 
+// Set by hand on cartons whose sides are cut 3 to 10 pixels off (`modar-lab bench pose --shape
+// --only "cut box"`): laxer ones mend sides whose pictures have nothing to do with each other.
 constexpr int kEdgeSamples = 200;  // along an edge
 constexpr int kSlow = 20;  // samples to either side whose mean is taken off: shading is no print
 // Shares of a picture at which its edge is read: what lies outermost may be what is behind the box.
