@@ -44,6 +44,28 @@ def pixels(file):
     return done.stdout
 
 
+# Of a stored photo by its orientation: whether its rows are the scene's columns, and whether its first row and its first column
+# lie at the scene's far side (JEITA CP-3451, orientation).
+EXIF_ORIGIN = {1: (False, False, False), 2: (False, False, True), 3: (False, True, True), 4: (False, True, False),
+               5: (True, False, False), 6: (True, True, False), 7: (True, True, True), 8: (True, False, True)}
+
+
+def turned_photo(orientation, width=160, height=96):
+    """A JPEG of a scene that is red at the top left, green at the top right, blue below."""
+    columns, far_row, far_column = EXIF_ORIGIN[orientation]
+    stored = (height, width) if columns else (width, height)
+    pixels = bytearray()
+    for row in range(stored[1]):
+        for column in range(stored[0]):
+            down, along = (stored[1] - 1 - row if far_row else row), (stored[0] - 1 - column if far_column else column)
+            x, y = (down, along) if columns else (along, down)
+            pixels += bytes((0, 0, 255) if y >= height / 2 else (255, 0, 0) if x < width / 2 else (0, 255, 0))
+    jpeg = subprocess.run(["ffmpeg", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{stored[0]}x{stored[1]}", "-i", "-", "-q:v", "2",
+                           "-f", "mjpeg", "-"], input=bytes(pixels), capture_output=True, check=True).stdout
+    tiff = b"II*\0" + struct.pack("<IHHHIHHI", 8, 1, 0x112, 3, 1, orientation, 0, 0)
+    return jpeg[:2] + b"\xff\xe1" + struct.pack(">H", 8 + len(tiff)) + b"Exif\0\0" + tiff + jpeg[2:]
+
+
 @unittest.skipUnless(have(*TOOLS) and pathlib.Path("/usr/share/android-framework-res/framework-res.apk").exists(),
                      "no aapt, zipalign, apksigner, dexdump, android-framework-res or JDK")
 class Apk(ProgramTest):
@@ -218,6 +240,8 @@ class Apk(ProgramTest):
                         print_of, self.folder / "table" / "%03d.png"], check=True)
         wall = self.folder / "wall.png"
         wall.write_bytes(png(1200, 900, (120, 120, 118)))
+        for orientation in EXIF_ORIGIN:
+            (self.folder / f"turned{orientation}.jpg").write_bytes(turned_photo(orientation))
         apk, _ = self.made("vases", bundle)
         self.run_app(apk, nv21_of(self.folder / "table"), home, "own", wall)
 

@@ -4,6 +4,8 @@ import android.content.ContentResolver;
 import android.content.Context;
 import android.graphics.Bitmap;
 import android.graphics.BitmapFactory;
+import android.graphics.Matrix;
+import android.media.ExifInterface;
 import android.net.Uri;
 import java.io.File;
 import java.io.FileInputStream;
@@ -40,13 +42,18 @@ final class OwnPictures {
 
     /** Of the longer side of photos that are worked on, pixels: as on the page. */
     private static final int SIDE = 1024;
+    /** Degrees by EXIF's orientation, after the mirror. */
+    private static final int[] CLOCKWISE = {0, 0, 0, 180, 180, 270, 90, 90, 270};
 
     private final ContentResolver content;
     private final File folder;
+    /** For what Android reads from files alone. */
+    private final File cache;
 
     OwnPictures(Context context) {
         content = context.getContentResolver();
         folder = new File(context.getFilesDir(), "own");
+        cache = context.getCacheDir();
     }
 
     /** Names are TIME-SCENE. */
@@ -120,7 +127,33 @@ final class OwnPictures {
         while (Math.max(how.outWidth, how.outHeight) / (2 * how.inSampleSize) >= SIDE) how.inSampleSize *= 2;
         Bitmap read = BitmapFactory.decodeByteArray(file, 0, file.length, how);
         if (read == null) throw new IOException("it is no picture");
-        return small(read);
+        return upright(small(read), orientation(file));
+    }
+
+    /** By the file's EXIF; 1 where it says nothing. */
+    private int orientation(byte[] picture) throws IOException {
+        File file = File.createTempFile("photo", null, cache);
+        try {
+            FileOutputStream out = new FileOutputStream(file);
+            try {
+                out.write(picture);
+            } finally {
+                out.close();
+            }
+            return new ExifInterface(file.getPath()).getAttributeInt(ExifInterface.TAG_ORIENTATION, ExifInterface.ORIENTATION_NORMAL);
+        } finally {
+            file.delete();
+        }
+    }
+
+    private static Bitmap upright(Bitmap stored, int orientation) {
+        if (orientation < ExifInterface.ORIENTATION_FLIP_HORIZONTAL || orientation > ExifInterface.ORIENTATION_ROTATE_270) return stored;
+        boolean mirrored = orientation == ExifInterface.ORIENTATION_FLIP_HORIZONTAL || orientation == ExifInterface.ORIENTATION_FLIP_VERTICAL
+                || orientation == ExifInterface.ORIENTATION_TRANSPOSE || orientation == ExifInterface.ORIENTATION_TRANSVERSE;
+        Matrix turn = new Matrix();
+        turn.setScale(mirrored ? -1 : 1, 1);
+        turn.postRotate(CLOCKWISE[orientation]);
+        return Bitmap.createBitmap(stored, 0, 0, stored.getWidth(), stored.getHeight(), turn, true);
     }
 
     static Bitmap small(Bitmap large) {

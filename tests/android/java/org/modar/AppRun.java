@@ -107,6 +107,26 @@ public final class AppRun {
     }
 
     /** All frames once, from a camera that was opened anew: the last picture. */
+    /** A photo that its EXIF turns: red at the top left, green at the top right, blue below. */
+    private static void upright(String photo) throws Exception {
+        app.onActivityResult(2, Activity.RESULT_OK, new android.content.Intent("", new android.net.Uri(photo)));
+        shown(R.id.own);
+        android.graphics.Bitmap read = drawn().bitmap;
+        int width = read.getWidth(), height = read.getHeight();
+        check(width == 160 && height == 96, photo + ": " + width + "x" + height);
+        int[] pixels = new int[width * height];
+        read.getPixels(pixels, 0, width, 0, 0, width, height);
+        int[] at = {20 * width + 20, 20 * width + 140, 76 * width + 20, 76 * width + 140};
+        int[] shift = {16, 8, 0, 0};
+        for (int i = 0; i < 4; i++) {
+            for (int channel = 0; channel <= 16; channel += 8) {
+                int value = pixels[at[i]] >> channel & 255;
+                check(channel == shift[i] ? value > 200 : value < 60, photo + ": " + Integer.toHexString(pixels[at[i]]) + " at " + i);
+            }
+        }
+        app.onBackPressed();
+    }
+
     private static byte[] shown() throws Exception {
         for (int i = 0; i < clip.length / size; i++) check(deliver(i), "frame " + i);
         return picture();
@@ -480,6 +500,7 @@ public final class AppRun {
         shown(R.id.own);
         app.onBackPressed();
         check(gone(R.id.own) && !gone(R.id.menu), "back");
+        for (int i = 1; i <= 8; i++) upright(other.replace("wall.png", "turned" + i + ".jpg"));
         app.onActivityResult(2, Activity.RESULT_OK, new android.content.Intent("", new android.net.Uri(other + ".none")));
         check(status().startsWith("This file is no picture"), "no file");
         shown(R.id.menu_forget).click();
