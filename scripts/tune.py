@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Prints how a bench's figures change with one constant of the code: the curve that chooses its value.
+"""Prints how a bench's figures change with constants of the code, one at a time: the curves that choose their values.
 
-  scripts/tune.py NAME [--file FILE] [--values A,B,...] [--jobs N] [--json] -- BENCH [OPTIONS]
-  scripts/tune.py kRatio -- pose --patterns patterns --backgrounds photos --frames 20 --parameters none
+  scripts/tune.py [FILE:]NAME... [--values A,B,...] [--jobs N] [--json] -- BENCH [OPTIONS]
+  scripts/tune.py kRatio kTukey -- pose --patterns patterns --backgrounds photos --frames 20 --parameters none
 
-NAME: a constant, such as kRatio, that is defined as `constexpr TYPE NAME = NUMBER;`. --file: where it is defined, if it is in several
-files. --values: default 0.5 to 2 times the present value. --jobs: benches at a time (default: a processor each); one alone measures
+NAME: a constant, such as kRatio, that is defined as `constexpr TYPE NAME = NUMBER;`; with its FILE, if it is in several. --values: of
+each; default 0.5 to 2 times the present one. --jobs: benches at a time (default: a processor each); one alone measures
 times well. BENCH: of `modar-lab bench`, with its options; its inputs are read by each run, so that all values see the same frames.
 A figure of several rows ("right_pct near", "right_pct far") is their mean. The present value is marked by a star.
-Builds a copy of the tree, in which the constant is a variable, in build/tune (minutes the first time, then the files that use it)."""
+Builds a copy of the tree, in which the constants are variables, in build/tune (minutes the first time, then the files that use it)."""
 import argparse
 import concurrent.futures
 import json
@@ -21,9 +21,10 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 TREE, BUILD = ROOT / "build/tune/tree", ROOT / "build/tune/build"
 DEFINITION = r"^(?P<indent> *)(?P<scope>(?:static |inline )*)constexpr (?P<type>[\w:]+) (?P<name>{}) ?= ?(?P<value>[^;\n]+);"
-# In the place of the constant; block and class scope need storage of their own, so that it is read once.
-READ = '#include <cstdlib>\ninline double modar_tuned(double value) { const char* text = std::getenv("MODAR_TUNED"); ' \
-       'return text == nullptr ? value : std::strtod(text, nullptr); }\n'
+# In the place of a constant; block and class scope need storage of their own, so that it is read once.
+READ = '#include <cstdlib>\n#ifndef MODAR_TUNED\n#define MODAR_TUNED\n' \
+       'inline double modar_tuned(const char* name, double value) { const char* text = std::getenv(name); ' \
+       'return text == nullptr ? value : std::strtod(text, nullptr); }\n#endif\n'
 FACTORS = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0)
 
 
@@ -32,29 +33,30 @@ def tracked():
     return [name for name in names.split("\0") if name and (ROOT / name).is_file()]
 
 
-def definition(name, file):
-    """The file that defines the constant, and the match of its definition."""
+def definition(asked):
+    """The file that defines the constant [FILE:]NAME, and the match of its definition."""
+    file, _, name = asked.rpartition(":")
     pattern = re.compile(DEFINITION.format(re.escape(name)), re.M)
     found = []
     for path in tracked():
-        if not path.endswith((".cpp", ".hpp")) or path.startswith("tests/") or file not in (None, path):
+        if not path.endswith((".cpp", ".hpp")) or path.startswith("tests/") or file not in ("", path):
             continue
         found += [(path, match) for match in pattern.finditer((ROOT / path).read_text())]
     if not found:
         sys.exit(f"tune.py: {name}: no file defines it as `constexpr TYPE {name} = NUMBER;`")
     if len(found) > 1:
-        sys.exit(f"tune.py: {name}: it is defined in {', '.join(path for path, _ in found)}; name one with --file")
+        sys.exit(f"tune.py: {name}: it is defined in {', '.join(path for path, _ in found)}; name one as FILE:{name}")
     return found[0]
 
 
 def as_variable(text, match):
-    """The file's text with the constant as a variable that MODAR_TUNED sets."""
+    """The file's text with the constant as a variable that MODAR_TUNED_<name> sets."""
     scope = match["scope"]
     if match["indent"] and not scope:
         scope = "static "  # in a function
     elif "static" in scope:
         scope = "static inline "  # in a class
-    line = f'{match["indent"]}{scope}const {match["type"]} {match["name"]} = static_cast<{match["type"]}>(modar_tuned({match["value"]}));'
+    line = f'{match["indent"]}{scope}const {match["type"]} {match["name"]} = static_cast<{match["type"]}>(modar_tuned("MODAR_TUNED_{match["name"]}", {match["value"]}));'
     rest = re.sub(rf"^ *static_assert\([^;]*\b{match['name']}\b[^;]*;", "", text[match.end():], flags=re.M)
     return READ + text[:match.start()] + line + rest
 
@@ -66,13 +68,22 @@ def write_if_new(path, data):
         path.write_bytes(data)
 
 
-def build(changed, text):
+def variables(constants):
+    """The texts of the files that define them, with variables in their places."""
+    texts = {}
+    for path, match in constants:
+        text = texts.get(path, (ROOT / path).read_text())
+        texts[path] = as_variable(text, re.compile(DEFINITION.format(re.escape(match["name"])), re.M).search(text))
+    return texts
+
+
+def build(texts):
     names = set(tracked())
     for old in TREE.rglob("*") if TREE.is_dir() else ():
         if old.is_file() and old.relative_to(TREE).as_posix() not in names:
             old.unlink()
     for name in names:
-        write_if_new(TREE / name, text.encode() if name == changed else (ROOT / name).read_bytes())
+        write_if_new(TREE / name, texts[name].encode() if name in texts else (ROOT / name).read_bytes())
         if os.access(ROOT / name, os.X_OK):
             (TREE / name).chmod(0o755)
     quiet = {"check": True, "stdout": sys.stderr}
@@ -82,12 +93,12 @@ def build(changed, text):
     subprocess.run(["ninja", "-C", BUILD, "modar-lab", "modar-model-probe"], **quiet)
 
 
-def figures(value, bench):
-    """The bench's figures with that value: the mean of the rows of each."""
+def figures(name, value, bench):
+    """The bench's figures with that value of one constant: the mean of the rows of each."""
     done = subprocess.run([BUILD / "bin/modar-lab", "bench", *bench, "--json", "--quiet"], capture_output=True, text=True,
-                          env={**os.environ, "MODAR_TUNED": repr(value)})
+                          env={**os.environ, f"MODAR_TUNED_{name}": repr(value)})
     if done.returncode != 0:
-        sys.exit(f"tune.py: with {value}: {done.stderr.strip()}")
+        sys.exit(f"tune.py: with {name} = {value}: {done.stderr.strip()}")
     rows = {}
     for row in json.loads(done.stdout):
         if row["ours"] is not None:
@@ -113,29 +124,45 @@ def values_of(match, asked):
     return sorted({*(float(f"{value:.6g}") if isinstance(value, float) else value for value in values), now}), now
 
 
+def curve_of(pool, name, values, bench):
+    return {value: pool.submit(figures, name, value, bench) for value in values}
+
+
+def show(path, match, now, curve, bench):
+    measures = list(curve[now])
+    print(f"{path}: {match['name']} = {match['value']}; modar-lab bench {' '.join(bench)}")
+    print("  ".join([f"{'value':>10} ", *(f"{measure:>12}" for measure in measures)]))
+    for value, row in curve.items():
+        print("  ".join([f"{value:>10.6g}{'*' if value == now else ' '}", *(f"{row.get(measure, float('nan')):>12.5g}" for measure in measures)]),
+              flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("name")
-    parser.add_argument("--file")
+    parser.add_argument("names", nargs="+", metavar="[FILE:]NAME")
     parser.add_argument("--values", default="")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--json", action="store_true")
-    parser.add_argument("bench", nargs="+")
-    options = parser.parse_args()
-    path, match = definition(options.name, options.file)
-    values, now = values_of(match, options.values)
-    build(path, as_variable((ROOT / path).read_text(), match))
+    words = sys.argv[1:]
+    if "--" not in words:
+        parser.error("no -- BENCH")
+    options, bench = parser.parse_args(words[:words.index("--")]), words[words.index("--") + 1:]
+    constants = [definition(name) for name in options.names]
+    if len({match["name"] for _, match in constants}) < len(constants):
+        sys.exit("tune.py: two constants of one name cannot be told apart; one at a time")
+    sweeps = [values_of(match, options.values) for _, match in constants]
+    build(variables(constants))
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        curve = dict(zip(values, pool.map(lambda value: figures(value, options.bench), values)))
-    if options.json:
-        print(json.dumps({"name": options.name, "file": path, "value": now, "bench": options.bench,
-                          "curve": [{"value": value, **row} for value, row in curve.items()]}))
-        return
-    measures = list(curve[now])
-    print(f"{path}: {options.name} = {match['value']}; modar-lab bench {' '.join(options.bench)}")
-    print("  ".join([f"{'value':>10} ", *(f"{measure:>12}" for measure in measures)]))
-    for value, row in curve.items():
-        print("  ".join([f"{value:>10.6g}{'*' if value == now else ' '}", *(f"{row.get(measure, float('nan')):>12.5g}" for measure in measures)]))
+        present_figures = pool.submit(figures, "", 0, bench)
+        curves = [curve_of(pool, match["name"], [value for value in values if value != now], bench)
+                  for (_, match), (values, now) in zip(constants, sweeps)]
+        for (path, match), (values, now), curve in zip(constants, sweeps, curves):
+            rows = {value: (present_figures if value == now else curve[value]).result() for value in values}
+            if options.json:
+                print(json.dumps({"name": match["name"], "file": path, "value": now, "bench": bench,
+                                  "curve": [{"value": value, **row} for value, row in rows.items()]}), flush=True)
+            else:
+                show(path, match, now, rows, bench)
 
 
 if __name__ == "__main__":

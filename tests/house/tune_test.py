@@ -37,7 +37,14 @@ class Tune(unittest.TestCase):
                                     ("", "  constexpr double kShare = 0.25;", "kShare")):
             with self.subTest(before + inside):
                 self.assertEqual(self.ran(before, inside, use), 0.25)
-                self.assertEqual(self.ran(before, inside, use, MODAR_TUNED="0.75"), 0.75)
+                self.assertEqual(self.ran(before, inside, use, MODAR_TUNED_kShare="0.75"), 0.75)
+
+    def test_several_constants_are_swept_apart(self):
+        path, lens = tune.definition("kLensVariance")
+        found = [(path, lens), tune.definition(f"{path}:kSampleVariance"), tune.definition("kMaxRotation")]
+        texts = tune.variables(found)
+        for each, match in found:
+            self.assertIn(f'modar_tuned("MODAR_TUNED_{match["name"]}"', texts[each])
 
     def test_values_lie_around_the_present_one(self):
         match = re.compile(tune.DEFINITION.format("kSteps"), re.M).search("constexpr int kSteps = 10;\n")
@@ -45,11 +52,12 @@ class Tune(unittest.TestCase):
         self.assertEqual(tune.values_of(match, "3,30"), ([3, 10, 30], 10))
 
     def test_a_constant_of_the_code_is_found_and_an_unknown_one_is_not(self):
-        path, match = tune.definition("kMaxRotation", None)
+        path, match = tune.definition("kMaxRotation")
         self.assertTrue(path.startswith("runtime/track/"))
         self.assertGreater(tune.present(match), 0)
+        self.assertEqual(tune.definition(f"{path}:kMaxRotation")[0], path)
         with self.assertRaises(SystemExit) as refused:
-            tune.definition("kNowhere", None)
+            tune.definition("kNowhere")
         self.assertIn("kNowhere", str(refused.exception))
 
 
