@@ -13,9 +13,10 @@ KEYS = {"Tab": 9, "Enter": 13, "Escape": 27, " ": 32, "ArrowLeft": 37, "ArrowUp"
 class Hand(Browser):
     """clicks: presses of the mouse, with what was dragged or dropped meanwhile."""
 
-    def __init__(self, folder, size=(1280, 720), extra=()):
+    def __init__(self, folder, size=(1280, 720), extra=(), camera=""):
+        """camera: a video that this machine's camera sees."""
         self.clicks, self.choosers = 0, []
-        super().__init__(folder, "", size, extra)
+        super().__init__(folder, camera, size, extra)
         self.resize(*size)
 
     def _note(self, message):
