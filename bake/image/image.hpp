@@ -28,7 +28,8 @@ inline constexpr std::uint32_t kMaxImageSide = 16384;
 /// (stb_image) as upright 8-bit RGBA: EXIF orientation is applied; gray, palette, CMYK and 16-bit
 /// images are converted; colour profiles are ignored. The size that a header states is checked
 /// before anything is allocated; a truncated or damaged file is an error, never a partial image.
-/// Errors: kIo "io.open"; kInvalidInput "image.decode", "image.too-large".
+/// Errors: kIo "io.open"; kInvalidInput "image.decode", "image.too-large"; kUnsupported
+/// "image.ktx".
 Result<RgbaImage> read_image(const std::string& path);
 /// The same from a file's bytes; `name` is what errors call it.
 Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name);

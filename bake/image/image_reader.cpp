@@ -29,6 +29,11 @@ Result<StoredImage> decode_stored(std::span<const std::byte> bytes, const std::s
   if (starts_with(bytes, "II*\0"sv) || starts_with(bytes, "MM\0*"sv)) {
     return decode_tiff(bytes, name);
   }
+  if (starts_with(bytes, "\xABKTX 20\xBB\r\n\x1A\n"sv)) {
+    return fail(ExitCode::kUnsupported, "image.ktx", name, "KTX 2 files are not read",
+                "convert it with Khronos' KTX-Software: ktx extract IN.ktx2 OUT.png; those in a "
+                "glTF file: npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb");
+  }
   return decode_stb(bytes, name);
 }
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "bake/import/conversion.hpp"
+
 namespace modar {
 namespace {
 
@@ -25,28 +27,6 @@ Format format_of(const std::string& extension) {
   return Format::kNone;
 }
 
-/// A word that a shell takes as it is.
-std::string quoted(const std::string& path) {
-  std::string text = "'";
-  for (const char c : path) text += c == '\'' ? "'\\''" : std::string(1, c);
-  return text + "'";
-}
-
-/// How to make a file of that kind into one that is read.
-std::string conversion(const std::string& path, const std::string& extension) {
-  const std::string glb = quoted(std::filesystem::path(path).replace_extension(".glb").string());
-  for (const char* known : {".fbx", ".dae", ".3ds", ".lwo", ".x", ".ac", ".ms3d", ".b3d", ".3mf"}) {
-    if (extension != known) continue;
-    return "convert it: assimp export " + quoted(path) + " " + glb +
-           " (Debian's assimp-utils), or export glTF from the program that made it";
-  }
-  if (extension == ".blend") {
-    return "convert it: blender -b " + quoted(path) +
-           " --python-expr \"import bpy; bpy.ops.export_scene.gltf(filepath=" + glb + ")\"";
-  }
-  return "convert it to glTF 2.0 (.glb, .gltf), Wavefront OBJ, PLY or STL";
-}
-
 }  // namespace
 
 bool is_model_file(const std::string& path) {
@@ -59,7 +39,7 @@ Result<void> require_model_format(const std::string& path) {
   return fail(ExitCode::kUnsupported, "model.format", path,
               extension.empty() ? "the file has no extension that names its format"
                                 : "files of the kind '" + extension + "' are not read",
-              conversion(path, extension));
+              format_conversion(path, extension));
 }
 
 Result<SourceModel> read_model(const std::string& path, unsigned jobs) {

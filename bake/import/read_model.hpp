@@ -70,7 +70,8 @@ Result<SourceModel> parse_ply(std::string_view bytes, const std::string& label);
 /// skins, morph targets) becomes a diagnostic. Errors: kIo "io.open", kInvalidInput "gltf.read",
 /// "gltf.no-faces", "gltf.accessor" (data outside of its buffer, an index beyond its vertices);
 /// kUnsupported "gltf.version" (glTF 1.0), "gltf.extension" (required extensions that are not read,
-/// by name).
+/// by name), "gltf.meshopt" (views of a newer codec). The last two say which command converts what
+/// a tool can.
 Result<SourceModel> read_gltf(const std::string& path);
 
 }  // namespace modar

@@ -218,6 +218,12 @@ TEST(ImageReader, OtherFilesAreRefused) {
   expect_code(to_bytes({'h', 'e', 'l', 'l', 'o'}), "image.decode", "text");
   expect_code(to_bytes({'P', '6', '\n', '1', ' ', '1', '\n', '2', '5', '5', '\n', 1, 2, 3}),
               "image.decode", "ppm");
+  const Result<RgbaImage> ktx = decode_image(
+      to_bytes({0xAB, 'K', 'T', 'X', ' ', '2', '0', 0xBB, '\r', '\n', 0x1A, '\n', 0}), "k.ktx2");
+  ASSERT_FALSE(ktx);
+  EXPECT_EQ(ktx.error().code, "image.ktx");
+  EXPECT_EQ(ktx.error().exit, ExitCode::kUnsupported);
+  EXPECT_NE(ktx.error().cure.find("ktx extract"), std::string::npos);
   const Result<RgbaImage> missing = read_image("no/such/file.png");
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().code, "io.open");

@@ -218,6 +218,11 @@ TEST_F(Gltf, RequiredExtensionsAreReadOrRefusedByName) {
   EXPECT_EQ(refused.error().exit, ExitCode::kUnsupported);
   EXPECT_EQ(refused.error().code, "gltf.extension");
   EXPECT_NE(refused.error().cause.find("KHR_texture_basisu, MODAR_none"), std::string::npos);
+  const auto basis = requires_these(R"("KHR_texture_basisu")");
+  ASSERT_FALSE(basis);
+  EXPECT_EQ(basis.error().exit, ExitCode::kUnsupported);
+  EXPECT_NE(basis.error().cure.find(": npx @gltf-transform/cli ktxdecompress '"),
+            std::string::npos);
   // Only used: read without, and said.
   const auto used =
       read(kOneTriangle + scene + R"(,"extensionsUsed":["KHR_materials_clearcoat"],)" +
@@ -562,6 +567,78 @@ TEST_F(Gltf, ViewsThatMeshoptimizerPackedAreWhatItWasGiven) {
       EXPECT_NE(refused.error().cause.find("buffer view 0"), std::string::npos);
     }
   }
+}
+
+/// A unit box by gltfpack 1.3. Debian's meshoptimizer decodes what `-cc` writes, not what `-cz`
+/// does.
+std::string gltfpack_box(const char* option) {
+  const char* const source = std::getenv("MODAR_SOURCE_DIR");
+  std::ifstream file(std::string(source != nullptr ? source : ".") +
+                         "/tests/fuzz/corpus/gltf/gltfpack_" + option + ".glb",
+                     std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+TEST_F(Gltf, GltfpacksFilesAreReadOrRefusedWithTheCommandThatUnpacksThem) {
+  const auto read_bytes = [&](const std::string& bytes) {
+    const fs::path path = folder_ / "it's a box.glb";
+    std::ofstream(path, std::ios::binary) << bytes;
+    return read_gltf(path.string());
+  };
+  const auto box = read_bytes(gltfpack_box("cc"));
+  ASSERT_TRUE(box) << to_line(box.error());
+  ASSERT_EQ(box->face_count(), 12u);
+  ASSERT_EQ(box->positions.size(), 8u);
+  for (std::size_t v = 0; v < 8; ++v) {
+    // A corner's colour is its place.
+    EXPECT_LT(glm::length(box->positions[v] - glm::dvec3(box->colours[v])), 1e-3) << v;
+  }
+  const std::string newer = gltfpack_box("cz");
+  const auto refused = read_bytes(newer);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, "gltf.meshopt");
+  EXPECT_EQ(refused.error().exit, ExitCode::kUnsupported);
+  EXPECT_NE(refused.error().cause.find("view 0 (at byte 0 of"), std::string::npos);
+  const std::string name = (folder_ / "it'\\''s a box").string();
+  EXPECT_EQ(refused.error().cure, "convert it: npx gltfpack -noq -km -i '" + name + ".glb' -o '" +
+                                      name + ".unpacked.glb'");
+  // The extension's other name does not matter, the version does.
+  std::string older = gltfpack_box("cc");
+  for (std::size_t at = 0; (at = older.find("EXT_meshopt", at)) != std::string::npos; ++at) {
+    older.replace(at, 3, "KHR");
+  }
+  const auto same = read_bytes(older);
+  ASSERT_TRUE(same) << to_line(same.error());
+  EXPECT_EQ(same->positions, box->positions);
+  // Both of its meshes and textures.
+  std::string both = newer;
+  const std::string required = R"("extensionsRequired":["KHR_mesh_quantization")";
+  const std::size_t at = both.find(required);
+  ASSERT_NE(at, std::string::npos);
+  both.replace(at, required.size(), R"("extensionsRequired":["KHR_texture_basisu"   )");
+  const auto twice = read_bytes(both);
+  ASSERT_FALSE(twice);
+  EXPECT_NE(twice.error().cure.find("unpacked.glb' && npx @gltf-transform/cli ktxdecompress '" +
+                                    name + ".unpacked.glb' '" + name + ".png.glb'"),
+            std::string::npos)
+      << twice.error().cure;
+}
+
+TEST_F(Gltf, ATextureOfKtxAloneIsThePictureThatCannotBeRead) {
+  const auto model = read(
+      std::string(R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36},
+          {"buffer":0,"byteOffset":36,"byteLength":6},{"buffer":0,"byteOffset":0,"byteLength":12}],
+          "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+          {"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}],)") +
+          R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],
+          "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],
+          "textures":[{"extensions":{"KHR_texture_basisu":{"source":0}}}],
+          "images":[{"bufferView":2,"mimeType":"image/ktx2"}],
+          "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])",
+      one_triangle());
+  ASSERT_TRUE(model) << to_line(model.error());
+  EXPECT_TRUE(model->materials[0].diffuse_map.ends_with(".ktx2"))
+      << model->materials[0].diffuse_map;
 }
 
 TEST_F(Gltf, SampleModelsAreReadOrRefused) {

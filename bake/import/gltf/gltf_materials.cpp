@@ -13,6 +13,7 @@
 #include <span>
 #include <system_error>
 
+#include "bake/import/conversion.hpp"
 #include "bake/import/gltf/gltf_pictures.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
 #include "bake/import/reflection.hpp"
@@ -302,13 +303,17 @@ class MaterialReader {
     return *paths_[index];
   }
 
-  /// The image of a texture: its PNG or JPEG, or else its WebP (EXT_texture_webp).
+  /// The image of a texture: its PNG or JPEG, or else its WebP (EXT_texture_webp), or its KTX 2
+  /// file, of which the reader of images says that it is none that it reads.
   static int source_of(const tinygltf::Texture& texture) {
-    const auto found = texture.extensions.find("EXT_texture_webp");
-    if (texture.source >= 0 || found == texture.extensions.end()) return texture.source;
-    if (!found->second.IsObject() || !found->second.Has("source")) return -1;
-    const tinygltf::Value& source = found->second.Get("source");
-    return source.IsInt() ? source.GetNumberAsInt() : -1;
+    if (texture.source >= 0) return texture.source;
+    for (const char* const name : {"EXT_texture_webp", kBasisTextures}) {
+      const auto found = texture.extensions.find(name);
+      if (found == texture.extensions.end() || !found->second.IsObject()) continue;
+      const tinygltf::Value& source = found->second.Get("source");
+      if (source.IsInt()) return source.GetNumberAsInt();
+    }
+    return -1;
   }
 
   std::string find_image(const tinygltf::Image& image, std::size_t index) {
@@ -321,6 +326,7 @@ class MaterialReader {
       const std::string path = new_picture(plain_name(image.name, "image" + std::to_string(index)) +
                                            (image.mimeType == "image/jpeg"   ? ".jpg"
                                             : image.mimeType == "image/webp" ? ".webp"
+                                            : image.mimeType == "image/ktx2" ? ".ktx2"
                                                                              : ".png"));
       const auto bytes = std::as_bytes(std::span(image.image));
       if (!folder_of_images_->path().empty() && write_file(path, bytes)) return path;

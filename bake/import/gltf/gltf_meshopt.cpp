@@ -3,6 +3,8 @@
 
 #include <meshoptimizer.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
@@ -11,6 +13,7 @@
 #include <optional>
 #include <vector>
 
+#include "bake/import/conversion.hpp"
 #include "bake/import/gltf/gltf_materials.hpp"
 #include "bake/io/input.hpp"
 #include "bake/json.hpp"
@@ -18,7 +21,16 @@
 namespace modar {
 namespace {
 
-constexpr const char* kExtension = "EXT_meshopt_compression";
+/// One extension under two names; Khronos' may use version 1 of the vertex codec, too.
+constexpr std::array kExtensions = {"EXT_meshopt_compression", "KHR_meshopt_compression"};
+
+std::optional<Json> extension_of(const Json& view) {
+  for (const char* const name : kExtensions) {
+    if (auto extension = view.find(std::string("extensions/") + name)) return extension;
+  }
+  return std::nullopt;
+}
+
 constexpr std::uint32_t kJsonChunk = 0x4E4F534A;    // "JSON"
 constexpr std::uint32_t kBinaryChunk = 0x004E4942;  // "BIN"
 /// Decoded bytes of an encoded one: 16 values of a byte each take two bits at least, and a triangle
@@ -112,6 +124,15 @@ bool undo_filter(const EncodedView& view, std::string& bytes) {
   return true;
 }
 
+/// Whether a newer encoder wrote the view than the library reads, which knows version 0 of the
+/// vertex codec. Only that version has colours with a filter.
+bool is_too_new(const EncodedView& view, const std::string& buffer) {
+  constexpr unsigned kVertexCodec = 0xA0;
+  if (view.mode != "ATTRIBUTES" || view.offset >= buffer.size()) return false;
+  const auto head = static_cast<unsigned char>(buffer[view.offset]);
+  return (head & 0xF0) == kVertexCodec && head != kVertexCodec;
+}
+
 /// Reading and writing JSON goes as deep as it does; glTF needs about ten.
 constexpr int kDeepest = 200;
 bool is_deep(const std::string& json) {
@@ -170,8 +191,8 @@ class Rewriter {
     Json placed = Json::array();
     for (std::size_t i = 0; i < views.size(); ++i) {
       Json view = *views.at(i);
-      const auto extension = view.find(std::string("extensions/") + kExtension);
-      if (extension) MODAR_TRY(place(i, encoded_view(*extension), view));
+      if (const auto extension = extension_of(view))
+        MODAR_TRY(place(i, encoded_view(*extension), view));
       placed.push_back(std::move(view));
     }
     json_.set("bufferViews", std::move(placed));
@@ -182,6 +203,13 @@ class Rewriter {
  private:
   Result<void> place(std::size_t index, const EncodedView& encoded, Json& view) {
     MODAR_ASSIGN(const std::string* buffer, load(index, encoded.buffer));
+    if (is_too_new(encoded, *buffer)) {
+      return fail(ExitCode::kUnsupported, "gltf.meshopt", label_,
+                  "its buffer view " + std::to_string(index) + " (at byte " +
+                      std::to_string(encoded.offset) +
+                      " of its buffer) has a newer version of meshoptimizer's vertex codec than 0",
+                  gltf_conversion(label_, {true, requires_basis()}));
+    }
     const std::optional<std::string> bytes = decoded(encoded, *buffer);
     if (!bytes) return fail_at(index, "its bytes contradict its extension");
     align(all_, '\0');
@@ -226,6 +254,14 @@ class Rewriter {
     return result;
   }
 
+  [[nodiscard]] bool requires_basis() const {
+    const Json names = json_.find("extensionsRequired").value_or(Json::array());
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (names.at(i)->text() == kBasisTextures) return true;
+    }
+    return false;
+  }
+
   [[nodiscard]] tl::unexpected<Error> fail_at(std::size_t view, const std::string& why) const {
     return fail(ExitCode::kInvalidInput, "gltf.meshopt", label_,
                 "its buffer view " + std::to_string(view) + " cannot be decoded: " + why,
@@ -246,7 +282,8 @@ class Rewriter {
 
 Result<std::string> decode_meshopt_views(std::string file, const std::string& folder,
                                          const std::string& label) {
-  if (file.find(kExtension) == std::string::npos) return file;
+  const auto named = [&](const char* name) { return file.find(name) != std::string::npos; };
+  if (std::none_of(kExtensions.begin(), kExtensions.end(), named)) return file;
   std::optional<Parts> parts = split(file);
   if (!parts || is_deep(parts->json)) return file;
   Json json = Json::parse(parts->json);
@@ -255,7 +292,7 @@ Result<std::string> decode_meshopt_views(std::string file, const std::string& fo
   if (!views.is_array() || !buffers.is_array()) return file;
   bool any = false;
   for (std::size_t i = 0; i < views.size() && !any; ++i) {
-    any = views.at(i)->find(std::string("extensions/") + kExtension).has_value();
+    any = extension_of(*views.at(i)).has_value();
   }
   if (!any) return file;
   return Rewriter(std::move(json), std::move(parts->binary), file.starts_with("glTF"), folder,

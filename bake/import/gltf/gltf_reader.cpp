@@ -14,6 +14,7 @@
 #include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
 
+#include "bake/import/conversion.hpp"
 #include "bake/import/gltf/gltf_accessor.hpp"
 #include "bake/import/gltf/gltf_materials.hpp"
 #include "bake/import/gltf/gltf_meshopt.hpp"
@@ -263,10 +264,9 @@ constexpr std::size_t kMaxFileBytes = 0xFFFFFFFF;
 
 /// Extensions that are read in full.
 constexpr const char* kKnownExtensions[] = {
-    "EXT_mesh_gpu_instancing",   "EXT_meshopt_compression",
-    "EXT_texture_webp",          "KHR_draco_mesh_compression",
-    "KHR_materials_unlit",       "KHR_mesh_quantization",
-    "KHR_texture_transform",     "KHR_materials_pbrSpecularGlossiness",
+    "EXT_mesh_gpu_instancing",    "EXT_meshopt_compression", "EXT_texture_webp",
+    "KHR_draco_mesh_compression", "KHR_materials_unlit",     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",    "KHR_texture_transform",   "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_transmission"};
 
 bool is_known(const std::string& extension) {
@@ -298,6 +298,11 @@ Result<void> require_support(const tinygltf::Model& gltf, std::string_view bytes
     unknown += (unknown.empty() ? "" : ", ") + extension;
   }
   if (unknown.empty()) return {};
+  if (unknown == kBasisTextures) {
+    return fail(ExitCode::kUnsupported, "gltf.extension", path,
+                "its textures are KTX 2 files (" + unknown + "), which are not read",
+                gltf_conversion(path, {false, true}));
+  }
   return fail(ExitCode::kUnsupported, "gltf.extension", path,
               "it requires extensions that are not read: " + unknown,
               "export it without them (meshes uncompressed or by Draco, textures as PNG, JPEG or "

@@ -1,0 +1,50 @@
+// Commands with the file's own name, to be copied into a shell.
+#include "bake/import/conversion.hpp"
+
+#include <filesystem>
+
+namespace modar {
+namespace {
+
+/// A word that a shell takes as it is.
+std::string quoted(const std::string& path) {
+  std::string text = "'";
+  for (const char c : path) text += c == '\'' ? "'\\''" : std::string(1, c);
+  return text + "'";
+}
+
+std::string with_ending(const std::string& path, const char* ending) {
+  return quoted(std::filesystem::path(path).replace_extension(ending).string());
+}
+
+}  // namespace
+
+std::string format_conversion(const std::string& path, const std::string& extension) {
+  const std::string glb = with_ending(path, ".glb");
+  for (const char* known : {".fbx", ".dae", ".3ds", ".lwo", ".x", ".ac", ".ms3d", ".b3d", ".3mf"}) {
+    if (extension != known) continue;
+    return "convert it: assimp export " + quoted(path) + " " + glb +
+           " (Debian's assimp-utils), or export glTF from the program that made it";
+  }
+  if (extension == ".blend") {
+    return "convert it: blender -b " + quoted(path) +
+           " --python-expr \"import bpy; bpy.ops.export_scene.gltf(filepath=" + glb + ")\"";
+  }
+  return "convert it to glTF 2.0 (.glb, .gltf), Wavefront OBJ, PLY or STL";
+}
+
+std::string gltf_conversion(const std::string& path, GltfCompression compression) {
+  std::string command = "convert it: ";
+  std::string from = quoted(path);
+  if (compression.meshes) {
+    const std::string unpacked = with_ending(path, ".unpacked.glb");
+    command += "npx gltfpack -noq -km -i " + from + " -o " + unpacked;
+    from = unpacked;
+  }
+  if (!compression.textures) return command;
+  if (compression.meshes) command += " && ";
+  return command + "npx @gltf-transform/cli ktxdecompress " + from + " " +
+         with_ending(path, ".png.glb") + " (with the program ktx of Khronos' KTX-Software)";
+}
+
+}  // namespace modar
