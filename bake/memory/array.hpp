@@ -10,13 +10,20 @@
 
 namespace modar {
 
+/// Blocks of at least so many bytes have their own pages, which are remapped as they grow; smaller
+/// ones are the heap's.
+inline constexpr std::size_t kLargeBlock = std::size_t{4} << 20;
+
 namespace detail {
 /// Throws std::bad_alloc; ends the program where exceptions are off.
 [[noreturn]] void out_of_memory();
 /// Memory of `size` bytes with the first bytes of `block` (nullptr: none), which had `old_size`.
-/// Large blocks are whole pages, moved by remapping.
 void* resize_block(void* block, std::size_t old_size, std::size_t size);
 void free_block(void* block, std::size_t size);
+/// Makes the pages of bytes [from, to) of a block resident, and some behind them, with one call of
+/// the system where writing to each would interrupt the program. Changes nothing else, and nothing
+/// at all where the system or the block's kind do not allow it.
+void touch_pages(void* block, std::size_t size, std::size_t from, std::size_t to);
 }  // namespace detail
 
 /// Like std::vector for trivially copyable elements, with two differences that large models need:
@@ -79,6 +86,8 @@ class Array {
   void append(const T* values, std::size_t count) {
     if (count == 0) return;
     resize(size_ + count);
+    detail::touch_pages(static_cast<void*>(data_), capacity_ * sizeof(T),
+                        (size_ - count) * sizeof(T), size_ * sizeof(T));
     std::memcpy(static_cast<void*>(data_ + size_ - count), values, count * sizeof(T));
   }
   void append(std::size_t count, const T& value) {

@@ -175,6 +175,10 @@ void* resize_file_block(void* block, std::size_t old_size, std::size_t size) {
   return moved;
 }
 
+bool has_file_blocks() {
+  return file_blocks != 0;
+}
+
 bool free_file_block(void* block) {
   if (file_blocks == 0) return false;
   FileHeap& heap = file_heap();

@@ -37,6 +37,8 @@ namespace detail {
 void* map_file_block(std::size_t size);
 /// Grows or shrinks such a block; nullptr where `block` is not one.
 void* resize_file_block(void* block, std::size_t old_size, std::size_t size);
+/// Whether there is such a block.
+bool has_file_blocks();
 /// Frees such a block; false where `block` is not one.
 bool free_file_block(void* block);
 }  // namespace detail

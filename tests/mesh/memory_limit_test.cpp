@@ -2,12 +2,15 @@
 #include "bake/memory/memory_limit.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <vector>
 
 #include "bake/memory/array.hpp"
 #include "tests/mesh/stages.hpp"
@@ -69,6 +72,28 @@ TEST(MemoryLimit, ArraysKeepTheirContentAndLeaveTheProcess) {
   }
   survivor.resize(9u << 20);
   EXPECT_EQ(survivor[999], pattern(999));
+}
+
+TEST(Array, AppendingMakesLittleBeyondItsEndResident) {
+  std::vector<std::uint32_t> part(5000);
+  Array<std::uint32_t> all;
+  all.reserve(kLargeBlock);  // four times as many bytes
+  const auto resident_here = [&] {
+    std::vector<unsigned char> pages(all.size() * 4 / 4096 + 1024);
+    EXPECT_EQ(::mincore(all.data(), 4096 * pages.size(), pages.data()), 0);
+    return static_cast<std::size_t>(std::count_if(
+        pages.begin(), pages.end(), [](unsigned char page) { return (page & 1) != 0; }));
+  };
+  EXPECT_EQ(resident_here(), 0u);
+  for (std::size_t k = 0; k < 300; ++k) {
+    for (std::size_t i = 0; i < part.size(); ++i) part[i] = pattern(k * part.size() + i);
+    all.append(part.data(), part.size());
+    const std::size_t written = (all.size() * 4 + 4095) / 4096;
+    const std::size_t found = resident_here();
+    ASSERT_GE(found, written) << k;
+    ASSERT_LE(found, written + 64) << k;  // 256 KiB
+  }
+  for (std::size_t i = 0; i < all.size(); ++i) ASSERT_EQ(all[i], pattern(i));
 }
 
 TEST(MemoryLimit, ModelsAreTheSame) {
