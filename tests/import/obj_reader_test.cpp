@@ -410,27 +410,28 @@ TEST(ObjReader, PlainLinesReadAsIndentedOnesDo) {
 }
 
 TEST(ObjReader, CornersOfManyDigitsAreReadAsTheyStand) {
-  // Lines of 8 to 98 bytes: leading zeros are as good as large models.
+  // Lines of 8 to 166 bytes: leading zeros are as good as large models.
   std::string text = kTriangle + "vt 0.5 0.5\nvt 0.25 0.5\nvn 0.0 0.0 1.0\n";
   std::vector<Corner> wanted;
   std::mt19937 random(9);
   for (int f = 0; f < 2000; ++f) {
-    const std::size_t kind = random() % 3;
+    const std::size_t kind = random() % 4;
     text += "f";
-    for (std::uint32_t k = 0; k < 3; ++k) {
+    for (std::size_t k = 3 + random() % 3; k > 0; --k) {
       Corner corner;
       const auto index = [&](std::uint32_t count, std::uint32_t& to) {
         to = static_cast<std::uint32_t>(random() % count);
         return std::string(random() % 10, '0') + std::to_string(to + 1);
       };
       text += " " + index(3, corner.position);
-      if (kind > 0) text += "/" + index(2, corner.uv);
-      if (kind > 1) text += "/" + index(1, corner.normal);
+      if (kind == 1 || kind == 2) text += "/" + index(2, corner.uv);
+      if (kind > 1) text += (kind == 2 ? "/" : "//") + index(1, corner.normal);
       wanted.push_back(corner);
     }
     text += "\n";
   }
   const SourceModel model = parse(text);
+  ASSERT_EQ(model.face_count(), 2000u);
   ASSERT_EQ(model.corner_count(), wanted.size());
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     ASSERT_EQ(model.corner(i).position, wanted[i].position) << i;

@@ -9,13 +9,14 @@
 #include <cstring>
 
 #include "bake/import/obj/number_parser.hpp"
+#include "bake/import/obj/obj_block.hpp"
 
 #ifdef __SSE2__
 namespace modar::detail {
 
 /// Bytes that a window looks at.
 inline constexpr std::size_t kWindow = 64;
-static_assert(kWindow + 32 <= kTextPadding);  // see index_ends()
+static_assert(2 * kWindow <= kTextPadding);  // see index_ends()
 
 /// Digits of a number at most: what a lane of eight bytes holds.
 inline constexpr unsigned kMostDigits = 8;
@@ -51,7 +52,8 @@ std::uint64_t points_in(const char* p) {
 
 /// The places of the lowest kCount bits, which are taken; false where there are fewer.
 template <std::size_t kCount>
-bool take_bits(std::uint64_t& bits, std::array<unsigned, kCount>& places) {
+[[gnu::always_inline]] inline bool take_bits(std::uint64_t& bits,
+                                             std::array<unsigned, kCount>& places) {
   std::array<std::uint64_t, kCount> left;
   for (std::uint64_t& each : left) {
     each = bits;
@@ -149,7 +151,8 @@ inline __m128d decimal_pair(__m128i numbers, const Decimal& low, const Decimal& 
 
 /// Computes two or three decimals; false where one of them is no number.
 template <std::size_t kCount>
-bool decimal_values(const std::array<Decimal, kCount>& decimals, double* values) {
+[[gnu::always_inline]] inline bool decimal_values(const std::array<Decimal, kCount>& decimals,
+                                                  double* values) {
   static_assert(kCount == 2 || kCount == 3);
   const Decimal& last = decimals[kCount - 1];
   __m128i bad = _mm_setzero_si128();
@@ -172,7 +175,8 @@ struct DecimalMarks {
 /// kCount decimals at p + begin, each after one blank but the first. Returns the place of the first
 /// byte after them, 0 for anything else. Reads from kTextPadding bytes ahead of p.
 template <std::size_t kCount>
-unsigned take_decimals(const char* p, unsigned begin, DecimalMarks& marks, double* values) {
+[[gnu::always_inline]] inline unsigned take_decimals(const char* p, unsigned begin,
+                                                     DecimalMarks& marks, double* values) {
   std::array<unsigned, kCount> ends;
   std::array<unsigned, kCount> points;
   if (!take_bits(marks.ends, ends) || !take_bits(marks.points, points)) return 0;
@@ -213,37 +217,55 @@ inline const char* take_two(const char* p, double* values) {
   return end == 0 ? nullptr : p + end;
 }
 
-/// Indices of three corners: values as the file has them, none of them 0; the fourth repeats the
-/// third.
-using TriangleIndices = std::array<std::uint32_t, 4>;
+/// How many indices a corner has, and how many bytes end one.
+constexpr std::size_t indices_of(CornerKind kind) {
+  return kind == CornerKind::kPosition ? 1 : kind == CornerKind::kUvNormal ? 3 : 2;
+}
+constexpr std::size_t ends_of(CornerKind kind) {
+  return kind == CornerKind::kNormal ? 3 : indices_of(kind);
+}
 
-/// Where three corners' kEach indices end. Three indices a corner may take more bytes than a window
-/// has: then the last corner gets one of its own.
-template <std::size_t kEach>
-bool index_ends(const char* p, std::array<unsigned, 3 * kEach>& ends) {
-  constexpr unsigned kBytes = kEach == 1 ? 32 : 64;
+/// Indices of three or four corners, 32 bits each: values as the file has them, none of them 0; of
+/// three, the fourth repeats the third.
+struct CornerIndices {
+  __m128i four;
+};
+
+/// The greater ones of two times four numbers below 2^31.
+inline __m128i greater(__m128i a, __m128i b) {
+  const __m128i first = _mm_cmpgt_epi32(a, b);
+  return _mm_or_si128(_mm_and_si128(first, a), _mm_andnot_si128(first, b));
+}
+
+/// The places of kCount bytes that are no digits, kEach a corner. Three a corner may take more
+/// bytes than a window has: then the corners from the third on get one of their own.
+template <std::size_t kEach, std::size_t kCount>
+[[gnu::always_inline]] inline bool index_ends(const char* p, std::array<unsigned, kCount>& ends) {
+  constexpr unsigned kBytes = kCount == 3 ? 32 : kCount == 4 ? 48 : kWindow;
   std::uint64_t others = bytes_outside<'0', 0, kBytes>(p);
   if constexpr (kEach < 3) {
     return take_bits(others, ends);
   } else {
     std::array<unsigned, 6> two_corners;
-    std::array<unsigned, 3> one_corner;
+    std::array<unsigned, kCount - 6> rest;
     if (!take_bits(others, two_corners)) return false;
-    const unsigned last = two_corners[5] + 1;
-    others = bytes_outside<'0', 0, 32>(p + last);
-    if (!take_bits(others, one_corner)) return false;
+    const unsigned begin = two_corners[5] + 1;
+    others = bytes_outside < '0', 0, kCount == 9 ? 32 : kWindow > (p + begin);
+    if (!take_bits(others, rest)) return false;
     std::copy(two_corners.begin(), two_corners.end(), ends.begin());
-    for (std::size_t i = 0; i < 3; ++i) ends[6 + i] = last + one_corner[i];
+    for (std::size_t i = 0; i < rest.size(); ++i) ends[6 + i] = begin + rest[i];
     return true;
   }
 }
 
-/// Three corners of kEach indices, "v", "v/t" or "v/t/n", at p and each after one blank but the
-/// first. Returns the first byte after them; nullptr for anything else. Reads from kTextPadding
-/// bytes ahead of p.
-template <std::size_t kEach>
-const char* take_triangle(const char* p, std::array<TriangleIndices, kEach>& indices) {
-  constexpr std::size_t kCount = 3 * kEach;
+/// Three or four corners of a kind at p, each after one blank but the first. Returns the first byte
+/// after them; nullptr for anything else. Reads from kTextPadding bytes ahead of p.
+template <std::size_t kCorners, CornerKind kKind>
+[[gnu::always_inline]] inline const char* take_corners(
+    const char* p, std::array<CornerIndices, indices_of(kKind)>& indices) {
+  static_assert(kCorners == 3 || kCorners == 4);
+  constexpr std::size_t kEach = ends_of(kKind);
+  constexpr std::size_t kCount = kCorners * kEach;
   std::array<unsigned, kCount> ends;
   if (!index_ends<kEach>(p, ends)) return nullptr;
   unsigned excess = 0;
@@ -252,14 +274,17 @@ const char* take_triangle(const char* p, std::array<TriangleIndices, kEach>& ind
     const char between = i % kEach == 0 ? ' ' : '/';
     if (i > 0 && p[ends[i - 1]] != between) return nullptr;
     digits[i] = {p + ends[i], i > 0 ? ends[i] - ends[i - 1] - 1 : ends[i]};
-    excess |= digits[i].count - 1;
+    const bool empty = kKind == CornerKind::kNormal && i % kEach == 1;  // between two slashes
+    excess |= empty ? kMostDigits * digits[i].count : digits[i].count - 1;
   }
   if (excess >= kMostDigits) return nullptr;
   __m128i zeros = _mm_setzero_si128();
-  for (std::size_t i = 0; i < kEach; ++i) {
-    const Digits& last = digits[2 * kEach + i];
-    const __m128i four = four_values(digits[i], digits[kEach + i], last, last);
-    _mm_storeu_si128(reinterpret_cast<__m128i*>(indices[i].data()), four);
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    const std::size_t at = kKind == CornerKind::kNormal ? 2 * i : i;
+    const Digits& third = digits[2 * kEach + at];
+    const Digits& fourth = kCorners == 4 ? digits[kCount - kEach + at] : third;
+    const __m128i four = four_values(digits[at], digits[kEach + at], third, fourth);
+    indices[i].four = four;
     zeros = _mm_or_si128(zeros, _mm_cmpeq_epi32(four, _mm_setzero_si128()));
   }
   return _mm_movemask_epi8(zeros) == 0 ? p + ends[kCount - 1] : nullptr;

@@ -27,7 +27,7 @@ constexpr bool is_digit(char c) {
 
 /// Text passed to these functions must end in a byte that is not part of a number, followed by at
 /// least this many readable bytes.
-inline constexpr std::size_t kTextPadding = 96;
+inline constexpr std::size_t kTextPadding = 128;
 
 /// What was found where a number was expected.
 enum class NumberKind : std::uint8_t { kFinite, kNotFinite, kNone };

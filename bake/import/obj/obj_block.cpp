@@ -193,57 +193,93 @@ const char* take_plain_corner(const char* p, ObjBlock& block) {
 }
 
 #ifdef __SSE2__
-void push_three(Scratch<std::uint32_t>& plane, std::uint64_t& highest,
-                const detail::TriangleIndices& indices) {
-  const std::uint32_t greatest = std::max({indices[0], indices[1], indices[2]});
-  highest = std::max<std::uint64_t>(highest, greatest);
-  for (unsigned i = 0; i < 3; ++i) plane.push(indices[i] - 1);
+using detail::CornerKind;
+
+/// Adds indices, which count from 0 there; highest: of those that count from 1.
+template <std::size_t kCorners>
+void push_corners(Scratch<std::uint32_t>& plane, FourIndices& highest,
+                  const detail::CornerIndices& indices) {
+  auto* const lanes = reinterpret_cast<__m128i*>(highest.data());
+  _mm_storeu_si128(lanes, detail::greater(_mm_loadu_si128(lanes), indices.four));
+  const __m128i from_zero = _mm_add_epi32(indices.four, _mm_set1_epi32(-1));
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(plane.room(kCorners)), from_zero);
 }
 
-/// A triangle in less than 64 bytes, of kEach indices a corner; nullptr for anything else.
-template <std::size_t kEach>
-const char* take_short_triangle(const char* p, ObjBlock& block) {
-  std::array<detail::TriangleIndices, kEach> indices;
-  p = detail::take_triangle(p, indices);
+/// A triangle or a quadrangle of a kind of corners; nullptr for anything else.
+template <std::size_t kCorners, CornerKind kKind>
+const char* take_short_face(const char* p, ObjBlock& block) {
+  constexpr bool kUv = kKind == CornerKind::kUv || kKind == CornerKind::kUvNormal;
+  constexpr bool kNormal = kKind == CornerKind::kNormal || kKind == CornerKind::kUvNormal;
+  std::array<detail::CornerIndices, detail::indices_of(kKind)> indices;
+  p = detail::take_corners<kCorners, kKind>(p, indices);
   if (p != nullptr) p = take_line_end(p);
   if (p == nullptr) return nullptr;
-  if constexpr (kEach > 1) {
+  if constexpr (kUv) {
     fill_plane(block, block.corner_uvs);
-    push_three(block.corner_uvs, block.highest.uvs, indices[1]);
+    push_corners<kCorners>(block.corner_uvs, block.highest_short[1], indices[1]);
   }
-  if constexpr (kEach > 2) {
+  if constexpr (kNormal) {
     fill_plane(block, block.corner_normals);
-    push_three(block.corner_normals, block.highest.normals, indices[2]);
+    push_corners<kCorners>(block.corner_normals, block.highest_short[2], indices.back());
   }
-  push_three(block.corner_positions, block.highest.positions, indices[0]);
-  if (kEach < 2 && block.corner_uvs.size() != 0) fill_plane(block, block.corner_uvs);
-  if (kEach < 3 && block.corner_normals.size() != 0) fill_plane(block, block.corner_normals);
-  block.face_corners.push(3);
+  push_corners<kCorners>(block.corner_positions, block.highest_short[0], indices[0]);
+  if (!kUv && block.corner_uvs.size() != 0) fill_plane(block, block.corner_uvs);
+  if (!kNormal && block.corner_normals.size() != 0) fill_plane(block, block.corner_normals);
+  block.face_corners.push(kCorners);
   return p;
 }
 
-/// How many indices the corner at p seems to have.
-unsigned indices_of_corner(const char* p) {
-  unsigned count = 1;
-  for (; is_digit(*p) || *p == '/'; ++p) count += *p == '/' ? 1 : 0;
-  return count;
+/// What the face at p seems to be.
+FaceShape shape_of(const char* p) {
+  unsigned slashes = 0;
+  unsigned corners = 1;
+  const char* const start = p;
+  bool pair = false;  // of slashes
+  for (; is_digit(*p) || *p == '/'; ++p) {
+    pair = pair || (*p == '/' && p > start && p[-1] == '/');
+    slashes += *p == '/' ? 1 : 0;
+  }
+  for (; is_digit(*p) || *p == '/' || *p == ' '; ++p) corners += *p == ' ' ? 1 : 0;
+  const CornerKind kind = pair           ? CornerKind::kNormal
+                          : slashes == 0 ? CornerKind::kPosition
+                          : slashes == 1 ? CornerKind::kUv
+                                         : CornerKind::kUvNormal;
+  return {corners, kind};
 }
 
-/// As take_short_triangle(), of as many indices a corner as the face before had; after another face
-/// the next one is taken to be like it.
-const char* take_likely_triangle(const char* p, ObjBlock& block) {
-  const char* next = nullptr;
-  if (block.likely_indices == 1) next = take_short_triangle<1>(p, block);
-  if (block.likely_indices == 2) next = take_short_triangle<2>(p, block);
-  if (block.likely_indices == 3) next = take_short_triangle<3>(p, block);
-  if (next == nullptr) block.likely_indices = indices_of_corner(p);
-  return next;
+template <std::size_t kCorners>
+const char* take_face_of(CornerKind kind, const char* p, ObjBlock& block) {
+  switch (kind) {
+    case CornerKind::kPosition:
+      return take_short_face<kCorners, CornerKind::kPosition>(p, block);
+    case CornerKind::kUv:
+      return take_short_face<kCorners, CornerKind::kUv>(p, block);
+    case CornerKind::kUvNormal:
+      return take_short_face<kCorners, CornerKind::kUvNormal>(p, block);
+    case CornerKind::kNormal:
+      return take_short_face<kCorners, CornerKind::kNormal>(p, block);
+  }
+  return nullptr;
+}
+
+const char* take_face_of(FaceShape shape, const char* p, ObjBlock& block) {
+  if (shape.corners == 3) return take_face_of<3>(shape.kind, p, block);
+  return shape.corners == 4 ? take_face_of<4>(shape.kind, p, block) : nullptr;
+}
+
+/// Tries the shape of the face before, then what this one seems to be.
+const char* take_likely_face(const char* p, ObjBlock& block) {
+  if (const char* const next = take_face_of(block.likely, p, block)) return next;
+  const FaceShape shape = shape_of(p);
+  if (shape == block.likely) return nullptr;
+  block.likely = shape;
+  return take_face_of(shape, p, block);
 }
 #endif
 
 const char* take_plain_face(const char* p, ObjBlock& block) {
 #ifdef __SSE2__
-  if (const char* const next = take_likely_triangle(p + 1, block)) return next;
+  if (const char* const next = take_likely_face(p + 1, block)) return next;
 #endif
   std::uint32_t count = 0;
   while (*p == ' ') {
@@ -640,7 +676,7 @@ class BlockParser {
 
 void parse_obj_block(const char* text, std::size_t size, const ObjLimits* limits, ObjBlock& block) {
   // The shortest element is two bytes long ("v\n", "1 ").
-  const std::size_t most = size / 2 + 2;
+  const std::size_t most = size / 2 + 2 + std::tuple_size_v<FourIndices>;
   block.positions.reset(most);
   block.colours.reset(most);
   block.uvs.reset(most);
@@ -653,8 +689,15 @@ void parse_obj_block(const char* text, std::size_t size, const ObjLimits* limits
   block.statements.clear();
   block.notes = {};
   block.highest = {};
-  block.likely_indices = 1;
+  block.highest_short = {};
+  block.likely = {};
   BlockParser(text, size, limits, block).run();
+  const auto raise = [](std::uint64_t& highest, const FourIndices& others) {
+    highest = std::max<std::uint64_t>(highest, *std::max_element(others.begin(), others.end()));
+  };
+  raise(block.highest.positions, block.highest_short[0]);
+  raise(block.highest.uvs, block.highest_short[1]);
+  raise(block.highest.normals, block.highest_short[2]);
 }
 
 std::size_t first_statement_end(std::string_view text, std::size_t from) {

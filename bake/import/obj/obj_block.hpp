@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -54,6 +55,9 @@ class Scratch {
     size_ = 0;
   }
   void push(const T& value) { data_[size_++] = value; }
+  /// Adds `count` elements and returns where to write them: there and behind them is room for as
+  /// many as FourIndices has.
+  T* room(std::size_t count) { return data_.get() + std::exchange(size_, size_ + count); }
   void pop(std::size_t count) { size_ -= count; }
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] T* data() { return data_.get(); }
@@ -65,6 +69,21 @@ class Scratch {
   std::unique_ptr<T[]> data_;
   std::size_t size_ = 0;
   std::size_t capacity_ = 0;
+};
+
+/// Indices that one register holds.
+using FourIndices = std::array<std::uint32_t, 4>;
+
+namespace detail {
+/// What a corner consists of: "v", "v/t", "v/t/n" or "v//n".
+enum class CornerKind : std::uint8_t { kPosition, kUv, kUvNormal, kNormal };
+}  // namespace detail
+
+/// What one look at a face's text wants to know before it.
+struct FaceShape {
+  unsigned corners = 3;
+  detail::CornerKind kind = detail::CornerKind::kPosition;
+  friend bool operator==(const FaceShape&, const FaceShape&) = default;
 };
 
 /// A usemtl, s or mtllib statement, and the face of the block that follows it.
@@ -97,9 +116,10 @@ struct ObjBlock {
   std::vector<std::uint32_t> relative;
   std::vector<ObjStatement> statements;
   NoteTallies notes{};
-  ObjCounts highest;  ///< greatest absolute index of a corner, plus one
+  ObjCounts highest;                           ///< greatest absolute index of a corner, plus one
+  std::array<FourIndices, 3> highest_short{};  ///< of faces that are read at once, by lanes
   std::uint64_t lines = 0;
-  unsigned likely_indices = 1;  ///< a corner, of the next face: tells what to try first
+  FaceShape likely;  ///< of the next face: what to try first
 };
 
 /// Set for the second, checked pass over a file with bad indices: every corner is checked against
