@@ -213,6 +213,9 @@ TEST(ObjReader, ColoursOfSomeOrAllVertices) {
   EXPECT_EQ(diagnostics(some), (std::multiset<std::string>{"obj.partial-colours:0"}));
   const SourceModel bytes = parse("v 0 0 0 255 0 51\nv 1 0 0 0 0 0\nv 0 1 0 0 0 0\nf 1 2 3\n");
   EXPECT_EQ(bytes.colours[0], glm::vec3(1, 0, 0.2f));
+  const SourceModel dark = parse("v 0 0 0 -0.5 0 1\nv 1 0 0 0 0.5 0\nv 0 1 0 0 0 0\nf 1 2 3\n");
+  EXPECT_EQ(dark.colours[0], glm::vec3(0, 0, 1));
+  EXPECT_EQ(dark.colours[1], glm::vec3(0, 0.5f, 0));
   EXPECT_TRUE(parse("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n").colours.empty());
 }
 
