@@ -217,7 +217,6 @@ int DrawList::add_group(const Request& request, std::uint32_t item, std::uint32_
   return culled;
 }
 
-/// Of some commands, in triangles.
 std::uint64_t DrawList::cost(const BundleView& bundle, std::size_t begin, std::size_t end) const {
   std::uint64_t sum = kCallTriangles * (end - begin);
   for (std::size_t i = begin; i < end; ++i) {

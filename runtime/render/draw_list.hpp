@@ -89,6 +89,9 @@ class DrawList {
   [[nodiscard]] std::vector<DrawCommand>& commands() { return commands_; }
   [[nodiscard]] const ModelView& view(std::uint32_t item) const { return views_[item]; }
   [[nodiscard]] int culled() const { return culled_; }
+  /// Of some commands, in triangles: a draw call counts as some, too.
+  [[nodiscard]] std::uint64_t cost(const BundleView& bundle, std::size_t begin,
+                                   std::size_t end) const;
 
  private:
   /// What a frame asks for.
@@ -100,9 +103,6 @@ class DrawList {
   };
   void add_item(const Request& request, std::uint32_t item);
   int add_group(const Request& request, std::uint32_t item, std::uint32_t group);
-  [[nodiscard]] std::uint64_t cost(const BundleView& bundle, std::size_t begin,
-                                   std::size_t end) const;
-
   std::vector<DrawCommand> commands_;
   std::vector<ModelView> views_;  ///< one an item
   int culled_ = 0;

@@ -23,9 +23,16 @@
 namespace modar {
 namespace {
 
-/// How often the error that is allowed on the screen is doubled where memory is short: 32 times as
-/// much is still the model's form. Set by hand.
+/// How often four times the error is allowed on the screen where time or memory is short. Errors
+/// count shading, which shows long before the form does: 1024 times as much is still that. Set by
+/// hand.
 constexpr int kCoarser = 5;
+/// Triangles of a frame, a draw call counted as some (see DrawList::cost()): 10 frames a second of
+/// a Mali-400, 60 of phones of five years later. Set by hand.
+constexpr std::uint64_t kMostTriangles = 1'000'000;
+/// The same where the GPU's memory is limited, as that of the slowest is: 100,000 triangles in 20
+/// draw calls take a Mali-400 10 ms.
+constexpr std::uint64_t kFewTriangles = 104'000;
 
 std::vector<VertexFormat> vertex_formats(const BundleView& bundle, const GlCaps& caps) {
   std::vector<VertexFormat> formats;
@@ -201,20 +208,21 @@ struct Renderer::State {
     gl.set_colour_writes(true);
   }
 
-  /// Where memory is short, stand-ins take the place of models that are too large for it, as long
-  /// as they are not that coarse that holes would be better.
+  /// What differs more takes the place of what a frame has no time or memory for. Where memory is
+  /// short nevertheless, holes are better than what is that coarse.
   void build_list(const glm::mat4& projection, int height, std::span<const DrawItem> items) {
     float pixels = options.lod_pixels;
-    list.build(bundle, painter.setups(), projection, height, items, pixels);
-    if (!geometry.streams() || bundle.stand_ins().empty()) return;
-    for (int i = 0; !list_fits(); ++i) {
-      pixels = i < kCoarser ? 2.0f * pixels : options.lod_pixels;
+    for (int i = 0;; ++i) {
       list.build(bundle, painter.setups(), projection, height, items, pixels);
-      if (i == kCoarser) return;
+      if (i > kCoarser || list_fits()) return;
+      pixels = i < kCoarser || !geometry.streams() ? 4.0f * pixels : options.lod_pixels;
     }
   }
 
   bool list_fits() {
+    const std::uint64_t most = caps.gpu_memory == 0 ? kMostTriangles : kFewTriangles;
+    if (list.cost(bundle, 0, list.commands().size()) > most) return false;
+    if (!geometry.streams() || bundle.stand_ins().empty()) return true;
     levels.clear();
     for (const DrawCommand& command : list.commands()) levels.push_back(command.level);
     return geometry.fits(levels);

@@ -151,6 +151,41 @@ TEST_F(MemoryTest, TooSmallABudgetFallsBackToCoarseLevels) {
     EXPECT_EQ(pixels[static_cast<std::size_t>(32 * 96 + x) * 4 + 1], 100);
 }
 
+TEST_F(MemoryTest, AFrameHasSoManyTriangles) {
+  // A tile, each of its 288 triangles again and again: a million or so, more than 100,000.
+  for (const auto& [times, fits, fits_small] :
+       {std::tuple(3600u, false, false), std::tuple(400u, true, false),
+        std::tuple(300u, true, true)}) {
+    BundleContent content = tile_row(1, 12);
+    LevelRecord& level = content.levels[0];
+    const std::vector<std::byte> once(
+        content.indices.begin() + static_cast<std::ptrdiff_t>(level.index_offset),
+        content.indices.begin() +
+            static_cast<std::ptrdiff_t>(level.index_offset + 2 * level.index_count));
+    level.index_offset = content.indices.size();
+    level.index_count *= times;
+    for (unsigned i = 0; i < times; ++i) {
+      content.indices.insert(content.indices.end(), once.begin(), once.end());
+    }
+    content.models[0].triangle_count = level.index_count / 3;
+    const MappedBundle bundle(content);
+    ASSERT_TRUE(bundle.view);
+    for (const bool small : {false, true}) {
+      GlCaps caps = probe_gl_caps();
+      if (small) caps.gpu_memory = std::uint64_t{1} << 30;
+      const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, caps);
+      ASSERT_TRUE(renderer);
+      RenderOptions options = flat_light();
+      options.lod_pixels = 0.1f;
+      renderer->set_options(options);
+      const DrawItem item = before(0.0);
+      draw(*renderer, default_camera(96, 64), {&item, 1});
+      const std::uint64_t all = 288ull * times;
+      EXPECT_EQ(renderer->stats().triangles, (small ? fits_small : fits) ? all : 2u) << times;
+    }
+  }
+}
+
 /// Bytes of a file's mapping that this process has touched, from /proc/self/smaps.
 std::size_t touched_bytes(const std::string& path) {
   std::ifstream maps("/proc/self/smaps");

@@ -159,7 +159,9 @@ struct RenderOptions {
   /// next resize(). draw() uses those of the app's surface.
   int samples = 1;
   bool instancing = true;   ///< items of one mesh or material share draw calls
-  float lod_pixels = 1.0f;  ///< largest error of a level of detail on the screen, in pixels
+  /// Largest error of a level of detail on the screen, in pixels. More where a frame would have more
+  /// than a million triangles, or 100,000 where caps.gpu_memory is limited.
+  float lod_pixels = 1.0f;
 };
 
 /// A rectangle: a picture or a video. False for a node that does not exist.
