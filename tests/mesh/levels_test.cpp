@@ -17,6 +17,7 @@
 #include "bake/mesh/lod/chunk_decimate.hpp"
 #include "bake/mesh/lod/level_map.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
+#include "bake/mesh/lod/pixel_cells.hpp"
 #include "bake/mesh/lod/surface_distance.hpp"
 #include "tests/import/samples.hpp"
 #include "tests/mesh/stages.hpp"
@@ -378,7 +379,8 @@ double brute_distance(const glm::dvec3& p, const std::vector<std::array<glm::dve
 }
 
 TEST(Levels, TheStatedErrorBoundsTheDistance) {
-  const PackedMesh mesh = testing::packed(levelled(welded(parse(ball(9))), 65535));
+  const ChunkedMesh split = levelled(welded(parse(ball(9))), 65535);
+  const PackedMesh mesh = testing::packed(split);
   const ChunkRecord& chunk = mesh.chunks[0];
   ASSERT_GE(chunk.level_count, 3u);
   std::vector<std::vector<std::array<glm::dvec3, 3>>> surfaces;
@@ -396,7 +398,9 @@ TEST(Levels, TheStatedErrorBoundsTheDistance) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> uniform(0, 1);
   for (std::uint32_t l = 1; l < chunk.level_count; ++l) {
-    const auto stated = static_cast<double>(mesh.levels[chunk.first_level + l].error);
+    // The record's counts shading, too.
+    const double stated = split.chunks[0].coarser[l - 1].error;
+    EXPECT_GE(mesh.levels[chunk.first_level + l].error, static_cast<float>(stated));
     double greatest = 0;
     for (const auto& [from, to] : {std::pair(0u, l), std::pair(l, 0u)}) {
       for (int i = 0; i < 150; ++i) {
@@ -445,7 +449,8 @@ TEST(Levels, RoughSurfacesStayWithinTheStatedErrors) {
     text += "f" + corner(i) + corner(i + 1) + corner(i + kSide + 1) + "\nf" + corner(i) +
             corner(i + kSide + 1) + corner(i + kSide) + "\n";
   }
-  const PackedMesh mesh = testing::packed(levelled(welded(parse(text)), 65535));
+  const ChunkedMesh split = levelled(welded(parse(text)), 65535);
+  const PackedMesh mesh = testing::packed(split);
   const ChunkRecord& chunk = mesh.chunks[0];
   ASSERT_GE(chunk.level_count, 4u);
   std::vector<std::vector<std::array<glm::dvec3, 3>>> surfaces;
@@ -456,7 +461,9 @@ TEST(Levels, RoughSurfacesStayWithinTheStatedErrors) {
       for (std::size_t i = 0; i < 3; ++i) out[i] = glm::dvec3(t[i][0], t[i][1], t[i][2]);
     }
     if (l == 0) continue;
-    const auto stated = static_cast<double>(mesh.levels[chunk.first_level + l].error);
+    // The record's counts shading, too.
+    const double stated = split.chunks[0].coarser[l - 1].error;
+    EXPECT_GE(mesh.levels[chunk.first_level + l].error, static_cast<float>(stated));
     const double greatest =
         std::max(sampled_distance(surfaces[0], surface), sampled_distance(surface, surfaces[0]));
     EXPECT_LE(greatest, stated) << "level " << l;
@@ -472,20 +479,17 @@ TEST(Levels, GoOnUntilTheModelIsAFewPixelsWide) {
     options.levels = kMaxLevels;
     Report report;
     ASSERT_TRUE(make_levels(split, options, report));
-    const PackedMesh mesh = testing::packed(split);
-    std::uint64_t finest = 0;
     std::uint64_t drawn = 0;
-    for (const ChunkRecord& chunk : mesh.chunks) {
-      finest += mesh.levels[chunk.first_level].index_count / 3;
+    for (const Chunk& chunk : split.chunks) {
       // What is off by no more than a pixel where the ball, of 2, is 13 pixels across.
-      std::uint32_t level = chunk.first_level;
-      for (std::uint32_t l = 1; l < chunk.level_count; ++l) {
-        const LevelRecord& coarser = mesh.levels[chunk.first_level + l];
-        if (coarser.error * 6.5f <= 1.0f) level = chunk.first_level + l;
+      std::uint64_t indices = chunk.indices.size();
+      for (const ChunkLevel& level : chunk.coarser) {
+        if (level.error * 6.5 <= 1.0) indices = level.indices.size();
       }
-      drawn += mesh.levels[level].index_count / 3;
+      drawn += indices / 3;
     }
-    EXPECT_LT(drawn * share, finest) << mesh.chunks.size() << " chunks draw " << drawn;
+    EXPECT_LT(drawn * share, triangles_in(split))
+        << split.chunks.size() << " chunks draw " << drawn;
   }
 }
 
@@ -806,6 +810,54 @@ TEST(Levels, WhatShadesABendWiderIsNoCloseLevel) {
     EXPECT_EQ(stated > 0.004f, rise > 0) << stated;
     EXPECT_GE(stated, static_cast<float>(split.chunks[0].coarser.back().shading));
   }
+}
+
+TEST(Levels, PixelsAreAsLargeAsWhatDiffersInThem) {
+  constexpr int kSide = 64;
+  constexpr double kStep = 2.0 / (kSide - 1);
+  std::vector<glm::dvec3> points;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    points.emplace_back(-1 + i % kSide * kStep, -1 + i / kSide * kStep, 0.0);
+  }
+  const PixelCells cells(points);
+  // Of each point, of which the surface is even: the smallest pixel that shows no difference.
+  const auto pixel = [&](const auto& difference_at) {
+    std::vector<LookDifference> differences(points.size());
+    for (int i = 0; i < kSide * kSide; ++i) {
+      differences[static_cast<std::size_t>(i)] = difference_at(i % kSide, i / kSide);
+      differences[static_cast<std::size_t>(i)].area = 1;
+    }
+    return cells.smallest_pixel(differences);
+  };
+  const auto normal = [](float x) {
+    LookDifference difference;
+    difference.normal = {0.0f, x, 0.0f};
+    return difference;
+  };
+  EXPECT_EQ(pixel([&](int, int) { return normal(0.01f); }), 0.0);
+  // It shows as long as the whole is a pixel.
+  EXPECT_GE(pixel([&](int, int) { return normal(0.03f); }), 2.0);
+  // From point to point, and in bands of eight, one way and the other.
+  const double fine = pixel([&](int x, int) { return normal(x % 2 == 0 ? 0.1f : -0.1f); });
+  EXPECT_GT(fine, kStep / 2);
+  EXPECT_LT(fine, 4 * kStep);
+  const double wide = pixel([&](int x, int) { return normal(x / 8 % 2 == 0 ? 0.1f : -0.1f); });
+  EXPECT_GT(wide, 4 * kStep);
+  EXPECT_LT(wide, 32 * kStep);
+  // One of 100 points may differ, two may not.
+  EXPECT_EQ(pixel([&](int x, int y) { return normal(x % 16 + y % 8 == 0 ? 1.0f : 0.0f); }), 0.0);
+  EXPECT_GT(pixel([&](int x, int y) { return normal(x % 8 + y % 6 == 0 ? 1.0f : 0.0f); }), kStep);
+  // Colours count as they are; a texture's slide by the pixels that it is wide.
+  LookDifference colour;
+  colour.colour = {0.0f, 1.5f, 0.0f};
+  EXPECT_EQ(pixel([&](int, int) { return colour; }), 0.0);
+  colour.colour = {0.0f, 0.0f, 2.5f};
+  EXPECT_GE(pixel([&](int, int) { return colour; }), 2.0);
+  LookDifference slid;
+  slid.slide = {0.003f, 0.0f};
+  const double slide = pixel([&](int, int) { return slid; });
+  EXPECT_GT(slide, 0.06);
+  EXPECT_LE(slide, 0.25);
 }
 
 TEST(Levels, ThreeTrianglesAtAnEdgeAreKept) {

@@ -16,6 +16,7 @@
 
 #include "bake/mesh/lod/chunk_decimate.hpp"
 #include "bake/mesh/lod/level_map.hpp"
+#include "bake/mesh/lod/pixel_cells.hpp"
 #include "bake/mesh/lod/surface_distance.hpp"
 #include "formats/base/parallel.hpp"
 
@@ -47,9 +48,9 @@ constexpr float kLeastPrice = static_cast<float>(kDistanceFloor * kDistanceFloor
 /// Halvings of a chunk beyond the coarsest level: the model's triangles are shared out by need, and
 /// a flat chunk may lose more than its share. Set by hand.
 constexpr std::uint32_t kFurther = 2;
-/// About so many vertices of a chunk are looked at for it. All of them would make levels of a scan
-/// of 1.1 million triangles 1.06 times as dear, these cost nothing that can be measured.
-constexpr std::size_t kShaded = 2000;
+/// Chunks of more triangles are looked at in every other one only. Set by hand.
+constexpr std::size_t kFewLooks = 10'000;
+constexpr std::size_t kLookStep = 6;  ///< indices
 /// Of the error of the next coarser level: a level that is off by more is hardly ever drawn, as
 /// that one may be from nearly the same distance on. Bundles of five scans are smaller by 1 to 11 %
 /// without such levels, that of a rough grid by 17 %.
@@ -423,35 +424,64 @@ double greatest_uv_shift(LevelSurface& surface, const ChunkVertices& vertices,
   return greatest;
 }
 
-/// How wide a level is shaded otherwise than the finest one, and how much: the root mean square,
-/// over some of the vertices, of the difference of the interpolated normal (as a length) times the
-/// distance of the nearest corner, whose own normal is right.
-double shading_of(const LevelSurface& surface, const TriMesh& mesh, const Chunk& chunk,
-                  std::span<const glm::dvec3> positions, const std::vector<std::uint16_t>& become,
-                  const std::vector<std::uint32_t>& nearby) {
-  if (mesh.normals.empty()) return 0;
-  const auto normal = [&](std::size_t v) { return glm::dvec3(mesh.normals[chunk.vertices[v]]); };
-  double sum = 0;
-  std::size_t count = 0;
-  for (std::size_t v = 0; v < positions.size(); v += 1 + positions.size() / kShaded) {
-    if (nearby[v] == kNoIndex) continue;
-    ++count;
-    if (become[v] == v) continue;
-    const std::uint16_t* t = surface.corners(nearby[v]);
-    const ClosestPoint closest = closest_point(positions[v], surface.triangle(nearby[v]));
-    const glm::dvec3 mean = (1 - closest.b - closest.c) * normal(t[0]) + closest.b * normal(t[1]) +
-                            closest.c * normal(t[2]);
-    const double length = glm::length(mean);
-    const double off = length > 0 ? glm::length(mean / length - normal(v)) : 1.0;
-    double square = std::numeric_limits<double>::infinity();
-    for (const glm::dvec3& corner : surface.triangle(nearby[v])) {
-      const glm::dvec3 apart = corner - positions[v];
-      square = std::min(square, glm::dot(apart, apart));
+/// Compares the looks of levels of one chunk with that of the finest: at the middles of its
+/// triangles.
+class ChunkLooker {
+ public:
+  ChunkLooker(const TriMesh& mesh, const Chunk& chunk, const MergedVertices& merged,
+              std::span<const glm::dvec3> positions, double length_of_uv)
+      : mesh_(mesh),
+        chunk_(chunk),
+        merged_(merged),
+        length_of_uv_(length_of_uv),
+        step_(chunk.indices.size() / 3 > kFewLooks ? kLookStep : 3),
+        points_(middles(positions)),
+        cells_(points_) {}
+
+  /// As ChunkLevel::shading. level: its triangles, with the vertices that carry their normals.
+  /// nearby: of each vertex a triangle near it, or kNoIndex.
+  double shading(const LevelSurface& surface, const std::vector<std::uint16_t>& level,
+                 const std::vector<std::uint32_t>& nearby) {
+    std::vector<LookDifference> differences(points_.size());
+    for (std::size_t i = 0; i < differences.size(); ++i) {
+      const std::uint16_t* own = &chunk_.indices[step_ * i];
+      const std::uint32_t start = nearby[merged_.first.empty() ? own[0] : merged_.first[own[0]]];
+      if (start == kNoIndex) continue;
+      const std::uint32_t t = surface.walk(points_[i], start);
+      const ClosestPoint closest = closest_point(points_[i], surface.triangle(t));
+      const Look there =
+          look_at(mesh_, vertices_of(&level[3 * std::size_t{t}]), closest.b, closest.c);
+      const Look here = look_at(mesh_, vertices_of(own), 1.0 / 3, 1.0 / 3);
+      differences[i] = {there, here, length_of_uv_, areas_[i]};
     }
-    sum += off * off * square;
+    return cells_.smallest_pixel(differences);
   }
-  return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
-}
+
+ private:
+  std::vector<glm::dvec3> middles(std::span<const glm::dvec3> positions) {
+    std::vector<glm::dvec3> points;
+    for (std::size_t i = 0; i < chunk_.indices.size(); i += step_) {
+      const glm::dvec3& a = positions[chunk_.indices[i]];
+      const glm::dvec3& b = positions[chunk_.indices[i + 1]];
+      const glm::dvec3& c = positions[chunk_.indices[i + 2]];
+      points.push_back((a + b + c) / 3.0);
+      areas_.push_back(glm::length(glm::cross(b - a, c - a)));
+    }
+    return points;
+  }
+  [[nodiscard]] std::array<std::uint32_t, 3> vertices_of(const std::uint16_t* corners) const {
+    return {chunk_.vertices[corners[0]], chunk_.vertices[corners[1]], chunk_.vertices[corners[2]]};
+  }
+
+  const TriMesh& mesh_;
+  const Chunk& chunk_;
+  const MergedVertices& merged_;
+  double length_of_uv_;
+  std::size_t step_;  ///< indices from one point to the next
+  std::vector<double> areas_;
+  std::vector<glm::dvec3> points_;
+  PixelCells cells_;
+};
 
 /// Fills one chunk's coarser levels: what it is after the collapses ahead of each cut.
 void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkGrid& grid,
@@ -462,6 +492,8 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkG
   const std::vector<glm::dvec2> texels =
       texels_of(mesh, chunk, positions, options.texture_sides, limits);
   const std::span<const std::uint16_t> finest = merged.indices_of(chunk);
+  const double side = texels.empty() ? 0.0 : options.texture_sides[chunk.material];
+  ChunkLooker looker(mesh, chunk, merged, positions, side * limits.length_of_uv);
   std::vector<MeasuredLevel> levels;
   levels.emplace_back(positions, std::vector<std::uint16_t>(finest.begin(), finest.end()));
   for (const Cut& cut : cuts) {
@@ -478,12 +510,9 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkG
     level.uv_shift = greatest_uv_shift(coarser.surface, {positions, texels}, become, nearby,
                                        limits.max_uv_shift);
     level.error = coarser.error;
-    if (merged.first.empty()) {
-      level.shading =
-          kShading * shading_of(coarser.surface, mesh, chunk, positions, become, nearby);
-    }
     level.indices = coarser.indices;
     split_normals(mesh, chunk, merged, positions, level.indices);
+    level.shading = looker.shading(coarser.surface, level.indices, nearby);
     levels.push_back(std::move(coarser));
   }
 }

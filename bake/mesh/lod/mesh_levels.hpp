@@ -26,13 +26,6 @@ struct LevelOptions {
 
 inline constexpr std::uint32_t kMaxLevels = 12;
 
-/// Of the width of a band of other shading times the difference of its normals: the error of
-/// position that is as bad to see. Set by hand: the default bake of a bent sheet of 128 triangles
-/// looks like that without levels, 500 pixels across (colour off by 3.3; 4.3 with the levels that
-/// positions alone allow). Levels of ten scans stay as they are: it is a quarter of their errors at
-/// most.
-inline constexpr double kShading = 0.25;
-
 /// Triangles of level 0.
 std::size_t triangles_in(const ChunkedMesh& mesh);
 
@@ -49,9 +42,9 @@ std::vector<std::uint32_t> halvings_of(std::size_t triangles, const LevelOptions
 /// most do (flat shading): corners of coarser triangles take the normal that is nearest to the
 /// triangle's. A level's error bounds the distance between it and level 0, both as the device
 /// decodes them, measured from either to the other (see level_distance()), for coarse levels by way
-/// of a finer one that is hardly off; beside it stands what its shading shows. Where vertices of
-/// level 0 are gone, the texture has slid by no more than 1 % of the chunk's diagonal. Figures go
-/// to report.levels.
+/// of a finer one that is hardly off; beside it stands what its normals, its colours and its
+/// texture show (see PixelCells), which is far more. Where vertices of level 0 are gone, the
+/// texture has slid by no more than 1 % of the chunk's diagonal. Figures go to report.levels.
 Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report& report);
 
 /// Takes out the levels that are hardly nearer to the finest than the next coarser one is.

@@ -14,6 +14,7 @@
 
 #include "bake/mesh/lod/mesh_collapse.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
+#include "bake/mesh/lod/pixel_cells.hpp"
 #include "bake/mesh/lod/surface_distance.hpp"
 
 namespace modar {
@@ -34,8 +35,8 @@ constexpr std::uint32_t kFinerHalvings = 1;
 /// stand-in: on a scan of 1.1 million triangles, against prices of the first one's source, rms is
 /// 0.91 at 1/16, 0.85 at 1/64 and 0.51 at 1/1024; 0.95, 0.87 and 0.55 without the former.
 constexpr double kOftener = 1.41;
-/// About so many vertices are looked at for the shading.
-constexpr std::size_t kShadedVertices = 4000;
+/// At most so many triangles are looked at for the shading. Set by hand.
+constexpr std::size_t kMostLooks = 50'000;
 
 /// A surface of the whole model that others are measured against.
 struct Measured {
@@ -264,37 +265,55 @@ double distance_both_ways(const Measured& fine, const Measured& coarse, MeshColl
   return surface_distance(b, a, back, found);
 }
 
-/// As ChunkLevel::shading, over some vertices of the joined levels.
-double shading_of(const Joined& fine, const TriMesh& source, const Measured& coarse,
-                  const TriMesh& mesh, MeshCollapser& collapser, std::size_t places) {
-  if (source.normals.empty()) return 0;
-  const MeshSurface surface(coarse.positions, coarse.indices);
-  const TrianglesAt at(coarse, collapser, places);
-  double sum = 0;
-  std::size_t count = 0;
-  for (std::size_t v = 0; v < fine.vertices.size();
-       v += 1 + fine.vertices.size() / kShadedVertices) {
-    const std::uint32_t start = at[fine.surface.places[v]];
-    if (start == kNoIndex) continue;
-    const glm::dvec3& point = fine.surface.positions[v];
-    const std::uint32_t t = surface.nearest_around(point, start).triangle;
-    const std::uint32_t* c = surface.corners(t);
-    const ClosestPoint closest = closest_point(point, surface.triangle(t));
-    const glm::dvec3 mean = (1 - closest.b - closest.c) * glm::dvec3(mesh.normals[c[0]]) +
-                            closest.b * glm::dvec3(mesh.normals[c[1]]) +
-                            closest.c * glm::dvec3(mesh.normals[c[2]]);
-    const double length = glm::length(mean);
-    const glm::dvec3 own(source.normals[fine.vertices[v]]);
-    const double off = length > 0 ? glm::length(mean / length - own) : 1.0;
-    double square = std::numeric_limits<double>::infinity();
-    for (const glm::dvec3& corner : surface.triangle(t)) {
-      const glm::dvec3 apart = corner - point;
-      square = std::min(square, glm::dot(apart, apart));
-    }
-    sum += off * off * square;
-    ++count;
+/// Lengths on the surface that a unit of uv covers, of each material; 0 where it has no texture.
+std::vector<double> lengths_of_uv(const Joined& joined, const TriMesh& mesh) {
+  std::vector<double> lengths(mesh.materials.size(), 0.0);
+  if (mesh.uvs.empty()) return lengths;
+  std::vector<double> uv_areas(lengths.size(), 0.0);
+  const Measured& surface = joined.surface;
+  for (std::size_t i = 0; i < surface.indices.size(); i += 3) {
+    const std::uint32_t* t = &surface.indices[i];
+    const std::uint32_t material = joined.materials[i / 3];
+    const glm::dvec3& origin = surface.positions[t[0]];
+    lengths[material] +=
+        glm::length(glm::cross(surface.positions[t[1]] - origin, surface.positions[t[2]] - origin));
+    const glm::dvec2& uv = mesh.uvs[joined.vertices[t[0]]];
+    const glm::dvec2 ab = mesh.uvs[joined.vertices[t[1]]] - uv;
+    const glm::dvec2 ac = mesh.uvs[joined.vertices[t[2]]] - uv;
+    uv_areas[material] += std::abs(ab.x * ac.y - ab.y * ac.x);
   }
-  return count > 0 ? kShading * std::sqrt(sum / static_cast<double>(count)) : 0.0;
+  for (std::size_t m = 0; m < lengths.size(); ++m) {
+    const bool seen = !mesh.materials[m].diffuse_map.empty() && uv_areas[m] > 0;
+    lengths[m] = seen ? std::sqrt(lengths[m] / uv_areas[m]) : 0.0;
+  }
+  return lengths;
+}
+
+/// Points of the joined levels where stand-ins are looked at.
+struct LookPoints {
+  std::vector<std::uint32_t> triangles;  ///< of the joined levels
+  std::vector<glm::dvec3> middles;       ///< of these
+  std::vector<Look> looks;
+  std::vector<double> areas;
+};
+
+LookPoints look_points(const Joined& joined, const TriMesh& mesh) {
+  LookPoints points;
+  const Measured& surface = joined.surface;
+  const std::size_t triangles = surface.indices.size() / 3;
+  for (std::size_t t = 0; t < triangles; t += 1 + triangles / kMostLooks) {
+    const std::uint32_t* i = &surface.indices[3 * t];
+    const glm::dvec3& a = surface.positions[i[0]];
+    const glm::dvec3& b = surface.positions[i[1]];
+    const glm::dvec3& c = surface.positions[i[2]];
+    points.triangles.push_back(static_cast<std::uint32_t>(t));
+    points.middles.push_back((a + b + c) / 3.0);
+    points.areas.push_back(glm::length(glm::cross(b - a, c - a)));
+    points.looks.push_back(
+        look_at(mesh, {joined.vertices[i[0]], joined.vertices[i[1]], joined.vertices[i[2]]},
+                1.0 / 3, 1.0 / 3));
+  }
+  return points;
 }
 
 /// Of a mesh in its chunks: the decoded surface.
@@ -322,6 +341,9 @@ class StandInMaker {
         joined_(join_chunks(mesh, options.positions, options.plan.first_halving - kFinerHalvings)),
         collapser_(collapse_mesh(mesh.mesh, joined_)),
         places_(collapser_.mesh().places.size()),
+        points_(look_points(joined_, mesh.mesh)),
+        lengths_of_uv_(lengths_of_uv(joined_, mesh.mesh)),
+        cells_(points_.middles),
         low_(std::numeric_limits<double>::infinity()),
         high_(-low_) {
     for (const glm::dvec3& p : joined_.surface.positions) {
@@ -350,19 +372,40 @@ class StandInMaker {
     const double distance =
         distance_both_ways(fine, surface, collapser_, places_, std::max(0.0, least - fine.error));
     surface.error = out.error = std::max(least, fine.error + distance);
-    out.shading = std::max(joined_.shading, shading_of(joined_, mesh_.mesh, surface, out.mesh.mesh,
-                                                       collapser_, places_));
+    out.shading = std::max(joined_.shading, shading_of(surface, out.mesh.mesh));
     measured_.push_back(std::move(surface));
     collapser_.forget();
     return true;
   }
 
  private:
+  /// As ChunkLevel::shading.
+  double shading_of(const Measured& coarse, const TriMesh& mesh) {
+    const MeshSurface surface(coarse.positions, coarse.indices);
+    const TrianglesAt at(coarse, collapser_, places_);
+    std::vector<LookDifference> differences(points_.middles.size());
+    for (std::size_t i = 0; i < differences.size(); ++i) {
+      const std::size_t corner = 3 * std::size_t{points_.triangles[i]};
+      const std::uint32_t start = at[joined_.surface.places[joined_.surface.indices[corner]]];
+      if (start == kNoIndex) continue;
+      const std::uint32_t t = surface.nearest_around(points_.middles[i], start).triangle;
+      const ClosestPoint closest = closest_point(points_.middles[i], surface.triangle(t));
+      const std::uint32_t* c = surface.corners(t);
+      const Look there = look_at(mesh, {c[0], c[1], c[2]}, closest.b, closest.c);
+      differences[i] = {there, points_.looks[i],
+                        lengths_of_uv_[joined_.materials[points_.triangles[i]]], points_.areas[i]};
+    }
+    return cells_.smallest_pixel(differences);
+  }
+
   const ChunkedMesh& mesh_;
   const StandInOptions& options_;
   Joined joined_;
   MeshCollapser collapser_;
   std::size_t places_;
+  LookPoints points_;
+  std::vector<double> lengths_of_uv_;
+  PixelCells cells_;
   glm::dvec3 low_;
   glm::dvec3 high_;
   std::vector<Measured> measured_;  ///< finest first

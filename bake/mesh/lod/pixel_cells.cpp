@@ -1,0 +1,132 @@
+// Averages over the cells of an octree, from the smallest to the largest.
+#include "bake/mesh/lod/pixel_cells.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <tuple>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+namespace modar {
+namespace {
+
+/// Bytes that a picture changes by where a normal changes by a radian: those of white in the light
+/// of the neutral room change by 60 to 130. Chosen with the next on the pictures of ten scans:
+/// where a level is first drawn, the 99th percentile of the difference is at most 2, but for 3.1 of
+/// one whose model is 11 pixels wide there.
+constexpr float kNormalGain = 120;
+/// Bytes that it changes by where a texture slides by a pixel. At 30, levels of a capsule in a
+/// photograph are drawn where they differ by 3.6, at 100 where by 1.6.
+constexpr float kSlideGain = 80;
+/// Bytes, however far a texture slides: across a seam, it tells nothing.
+constexpr float kMostSlide = 60;
+/// Bytes that nobody sees, and the share of the area that may differ by more.
+constexpr float kSame = 2;
+constexpr double kShare = 0.01;
+/// Halvings of the box to the smallest cell: a chunk has at most 65,535 vertices, some 256 along a
+/// side.
+constexpr unsigned kBits = 10;
+
+/// The lowest ten bits, two zeros after each.
+std::uint32_t spread(std::uint32_t x) {
+  x = (x | x << 16) & 0x030000FFu;
+  x = (x | x << 8) & 0x0300F00Fu;
+  x = (x | x << 4) & 0x030C30C3u;
+  return (x | x << 2) & 0x09249249u;
+}
+
+/// Sums over a cell.
+struct Cell {
+  glm::vec3 normal{0.0f};
+  glm::vec3 colour{0.0f};
+  glm::vec2 slide{0.0f};
+  float area = 0;
+
+  void add(const LookDifference& d) {
+    normal += d.area * d.normal;
+    colour += d.area * d.colour;
+    slide += d.area * d.slide;
+    area += d.area;
+  }
+  /// Of 255. side: of the pixel.
+  [[nodiscard]] float shown(float side) const {
+    const glm::vec3 c = glm::abs(colour);
+    return (kNormalGain * glm::length(normal) + std::max({c.x, c.y, c.z}) +
+            std::min(kSlideGain * glm::length(slide) / side, kMostSlide * area)) /
+           area;
+  }
+};
+
+}  // namespace
+
+Look look_at(const TriMesh& mesh, const std::array<std::uint32_t, 3>& corners, double b, double c) {
+  Look look;
+  const std::array<double, 3> weights = {1 - b - c, b, c};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::uint32_t v = corners[k];
+    if (!mesh.normals.empty()) look.normal += weights[k] * glm::dvec3(mesh.normals[v]);
+    if (!mesh.colours.empty()) look.colour += weights[k] * glm::dvec3(mesh.colours[v]);
+    if (!mesh.uvs.empty()) look.uv += weights[k] * mesh.uvs[v];
+  }
+  return look;
+}
+
+PixelCells::PixelCells(std::span<const glm::dvec3> points) {
+  glm::dvec3 low = points[0];
+  glm::dvec3 high = low;
+  for (const glm::dvec3& p : points) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+  side_ = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  const double scale = side_ > 0 ? ((1 << kBits) - 1) / side_ : 0.0;
+  places_.reserve(points.size());
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const glm::uvec3 at(scale * (points[i] - low));
+    places_.push_back({spread(at.x) | spread(at.y) << 1 | spread(at.z) << 2, i});
+  }
+  std::sort(places_.begin(), places_.end(), [](const Place& a, const Place& b) {
+    return std::tie(a.cell, a.point) < std::tie(b.cell, b.point);
+  });
+}
+
+double PixelCells::share_above(std::span<const LookDifference> differences, unsigned bits) const {
+  const auto side = static_cast<float>(std::ldexp(side_, -static_cast<int>(bits)));
+  const unsigned shift = 3 * (kBits - bits);
+  double all = 0;
+  double above = 0;
+  Cell cell;
+  const auto close = [&] {
+    if (cell.area > 0) {
+      all += static_cast<double>(cell.area);
+      if (!(cell.shown(side) < kSame)) above += static_cast<double>(cell.area);
+    }
+    cell = {};
+  };
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    if (i > 0 && places_[i].cell >> shift != places_[i - 1].cell >> shift) close();
+    cell.add(differences[places_[i].point]);
+  }
+  close();
+  return all > 0 ? above / all : 0.0;
+}
+
+double PixelCells::smallest_pixel(std::span<const LookDifference> differences) const {
+  double finer = share_above(differences, kBits);
+  if (finer <= kShare) return 0;
+  for (unsigned bits = kBits - 1;; --bits) {
+    const double share = share_above(differences, bits);
+    const double side = std::ldexp(side_, -static_cast<int>(bits));
+    if (share <= kShare) {
+      // Between the two sides, as a power law.
+      const double most = std::log(finer / std::max(share, kShare / 16));
+      return side * std::exp2(-1 + std::log(finer / kShare) / most);
+    }
+    if (bits == 0) return 2 * side;
+    finer = share;
+  }
+}
+
+}  // namespace modar

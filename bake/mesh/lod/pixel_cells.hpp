@@ -1,0 +1,66 @@
+// How small a level must be drawn before its picture is that of the finest one. Internal to lod.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "bake/mesh/tri_mesh.hpp"
+
+namespace modar {
+
+/// What a mesh shows at a point.
+struct Look {
+  glm::dvec3 normal{0.0};  ///< as it is blended, not of unit length
+  glm::dvec3 colour{0.0};  ///< of 255, as stored
+  glm::dvec2 uv{0.0};
+};
+
+/// At the point of a triangle with barycentric coordinates 1 - b - c, b, c. corners: vertices of
+/// the mesh.
+Look look_at(const TriMesh& mesh, const std::array<std::uint32_t, 3>& corners, double b, double c);
+
+/// A level's look at a point of the finest one, less what the finest has there.
+struct LookDifference {
+  glm::vec3 normal{0.0f};
+  glm::vec3 colour{0.0f};  ///< of 255, as stored
+  glm::vec2 slide{0.0f};   ///< of the texture, as a length on the surface
+  float area = 0;          ///< that the point stands for; 0: nothing is known of it
+
+  LookDifference() = default;
+  /// length_of_uv: on the surface, 0 where no texture is seen.
+  LookDifference(const Look& there, const Look& here, double length_of_uv, double of_area)
+      : normal(there.normal - here.normal),
+        colour(there.colour - here.colour),
+        slide(length_of_uv * (there.uv - here.uv)),
+        area(static_cast<float>(of_area)) {}
+};
+
+/// Points of a surface in cells, each of which stands for a pixel: halves of a box, again and
+/// again.
+class PixelCells {
+ public:
+  explicit PixelCells(std::span<const glm::dvec3> points);
+
+  /// Side of the smallest pixel, in the points' unit, over which differences average out: but for 1
+  /// % of the area, all pixels of a picture differ by less than 2 of 255. 0: any pixel will do.
+  /// differences: one a point.
+  [[nodiscard]] double smallest_pixel(std::span<const LookDifference> differences) const;
+
+ private:
+  [[nodiscard]] double share_above(std::span<const LookDifference> differences,
+                                   unsigned bits) const;
+
+  struct Place {
+    std::uint32_t cell = 0;  ///< three bits a halving, the coarsest first
+    std::uint32_t point = 0;
+  };
+  double side_ = 0;  ///< of the box
+  std::vector<Place> places_;
+};
+
+}  // namespace modar
