@@ -112,7 +112,7 @@ Json level_list(const BundleView& bundle, std::uint32_t index) {
     }
     list.push_back({{"triangles", triangles},
                     {"chunks", group.chunk_count},
-                    {"position_error_max", static_cast<double>(error) * model.scale}});
+                    {"error", static_cast<double>(error) * model.scale}});
   };
   for (std::uint32_t l = 0; l < model.level_count; ++l) add(bundle.chunk_group(index), l);
   for (std::uint32_t g = bundle.models().size(); g < bundle.chunk_groups(); ++g) {

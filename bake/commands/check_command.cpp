@@ -1,6 +1,7 @@
 // `modar check`: is this bundle good? Verdict first, then one line an issue.
 #include "bake/commands/check_command.hpp"
 
+#include <cinttypes>
 #include <cstdio>
 #include <string>
 
@@ -50,6 +51,12 @@ void print_looks(const std::vector<ModelLook>& looks) {
     std::printf("model '%s': SSIM %.4f, worst %.4f; colour off by %.2f, worst %.2f; see %s\n",
                 look.name.c_str(), look.ssim_mean, look.ssim_worst, look.delta_e_mean,
                 look.delta_e_worst, look.picture.c_str());
+    for (const LevelLook& level : look.levels) {
+      std::printf(
+          "  level %u, from %.0f pixels down: differs by %.1f of 255 (99 %% of its pixels), "
+          "%" PRIu64 " of %" PRIu64 " triangles\n",
+          level.level, level.side_px, level.difference, level.triangles, level.finest_triangles);
+    }
   }
 }
 

@@ -71,6 +71,18 @@ Json poses_json(const std::vector<PatternRange>& ranges) {
   return list;
 }
 
+Json levels_json(const std::vector<LevelLook>& levels) {
+  Json list = Json::array();
+  for (const LevelLook& level : levels) {
+    list.push_back({{"level", level.level},
+                    {"side_px", level.side_px},
+                    {"triangles", level.triangles},
+                    {"finest_triangles", level.finest_triangles},
+                    {"difference_p99", level.difference}});
+  }
+  return list;
+}
+
 Json looks_json(const std::vector<ModelLook>& looks) {
   Json list = Json::array();
   for (const ModelLook& look : looks) {
@@ -81,7 +93,8 @@ Json looks_json(const std::vector<ModelLook>& looks) {
                     {"delta_e_mean", look.delta_e_mean},
                     {"delta_e_worst", look.delta_e_worst},
                     {"worst_view", look.worst_view},
-                    {"picture", look.picture.empty() ? Json() : Json(look.picture)}});
+                    {"picture", look.picture.empty() ? Json() : Json(look.picture)},
+                    {"levels", levels_json(look.levels)}});
   }
   return list;
 }

@@ -181,7 +181,7 @@ class Check(ProgramTest):
 
     def test_models_are_looked_at_beside_their_sources(self):
         path = self.folder / "pottery.modar"
-        done = self.modar("bake", "--model", POTTERY, "--no-lods", "-o", path, "--quiet")
+        done = self.modar("bake", "--model", POTTERY, "-o", path, "--quiet")
         self.assertEqual(done.returncode, 0, done.stderr)
         looks = json.loads(self.check(0, path, "--json", "--source", POTTERY, "--visual", self.folder / "looks"))
         jsonschema.validate(looks, OURS)
@@ -189,6 +189,14 @@ class Check(ProgramTest):
         self.assertGreater(look["ssim_worst"], 0.97)
         self.assertLess(look["delta_e_worst"], 4)
         self.assertEqual(pathlib.Path(look["picture"]).read_bytes()[1:4], b"PNG")
+        # Levels are smaller and coarser from one to the next, and none is drawn where it shows.
+        levels = look["levels"]
+        self.assertGreater(len(levels), 1)
+        for finer, level in zip([{"triangles": levels[0]["finest_triangles"], "side_px": 1e9}, *levels], levels):
+            self.assertLessEqual(level["triangles"], finer["triangles"])
+            self.assertLessEqual(level["side_px"], finer["side_px"])
+            self.assertLess(level["difference_p99"], 2)
+        self.assertLess(levels[-1]["triangles"], levels[0]["triangles"])
 
     @unittest.skipUnless(os.environ.get("MODAR_SOAK", "0") != "0", "seconds under ASan: with --all")
     def test_patterns_are_tracked_in_rendered_views(self):

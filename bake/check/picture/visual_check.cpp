@@ -22,23 +22,6 @@
 namespace modar {
 namespace {
 
-constexpr std::size_t kViews = 12;
-constexpr double kDistance = 4.0;  // of the eye from the middle of a model in [-1,1]
-
-std::array<glm::dvec3, kViews> view_directions() {
-  const double golden = (1 + std::sqrt(5.0)) / 2;
-  std::array<glm::dvec3, kViews> views;
-  std::size_t n = 0;
-  for (const double a : {-1.0, 1.0}) {
-    for (const double b : {-golden, golden}) {
-      views[n++] = {0, a, b};
-      views[n++] = {a, b, 0};
-      views[n++] = {b, 0, a};
-    }
-  }
-  return views;
-}
-
 /// The part of both images that shows something, so that empty surroundings earn nothing.
 struct Crop {
   std::uint32_t left = 0;
@@ -111,6 +94,10 @@ class Looker {
           (std::filesystem::path(options_.picture_folder) / (look.name + ".png")).string();
       MODAR_TRY(write_png(worst_, look.picture));
     }
+    MODAR_ASSIGN(look.levels, look_at_levels(bundle_, *renderer_, index, {}));
+    // Those were drawn in other sizes and by other errors.
+    renderer_->set_options(render_);
+    MODAR_TRY(renderer_->resize(options_.side, options_.side));
     judge(index, look);
     return look;
   }
@@ -122,15 +109,13 @@ class Looker {
     for (const glm::dvec3& p : mesh.positions) radius = std::max(radius, glm::length(p));
     // The sphere around the model fills the view.
     camera_.fx = camera_.fy =
-        0.49 * options_.side * std::sqrt(kDistance * kDistance / (radius * radius) - 1);
+        0.49 * options_.side * std::sqrt(kViewDistance * kViewDistance / (radius * radius) - 1);
     look.ssim_worst = 2;
     look.ssim_mean = look.delta_e_mean = 0;
     const auto views = view_directions();
     double shown_views = 0;
     for (std::size_t view = 0; view < kViews; ++view) {
-      const glm::dmat4 to_eye =
-          glm::lookAt(kDistance * glm::normalize(views[view]), glm::dvec3(0.0),
-                      std::fabs(views[view].x) > 1 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0));
+      const glm::dmat4 to_eye = view_from(views[view]);
       const RgbaImage wanted = render_reference(mesh, textures, camera_, to_eye, render_);
       const RgbaImage shown = draw(index, to_eye);
       const Crop crop = shown_part(wanted, shown, clear_);

@@ -10,6 +10,7 @@
 #include <glm/vec3.hpp>
 
 #include "bake/bundle/bundle_builder.hpp"
+#include "bake/check/picture/level_look.hpp"
 #include "bake/image/image.hpp"
 #include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
@@ -36,7 +37,8 @@ struct ModelLook {
   double delta_e_mean = 0;   ///< CIE 1976, mean over the model's pixels, then over the views
   double delta_e_worst = 0;  ///< of the worst view
   int worst_view = 0;
-  std::string picture;  ///< source and bundle side by side; empty: not written
+  std::string picture;            ///< source and bundle side by side; empty: not written
+  std::vector<LevelLook> levels;  ///< each where it is first drawn, the finest left out
 };
 
 /// An sRGB pixel in CIELAB (D65).
