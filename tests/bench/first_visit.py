@@ -141,7 +141,7 @@ def make_site(folder, bundle, page, raw):
     description = folder / "site.json"
     site = json.loads(description.read_text())
     if raw:
-        name = site["bundles"][0]["file"].replace(".packed", ".modar")
+        name = re.sub("&first=[0-9]+", "", site["bundles"][0]["file"]).replace(".packed", ".modar")
         site["bundles"][0]["file"] = name
         description.write_text(json.dumps(site))
     return (folder / site["bundles"][0]["file"].split("?")[0]).stat().st_size
