@@ -14,6 +14,7 @@
 namespace modar {
 
 class BundleView;
+struct SectionEntry;
 
 enum class Severity : std::uint8_t { kError, kWarning, kInfo };
 
@@ -68,5 +69,7 @@ std::string first_error(std::span<const std::byte> bytes, const CheckOptions& op
 /// since the bundle was written, which BundleView::open() does not look at. Reads the whole file.
 /// Errors: kInvalidInput "section.hash".
 Result<void> verify_sections(const BundleView& bundle);
+/// What verify_sections() says of a section whose bytes have another hash.
+Error wrong_section(const BundleView& bundle, const SectionEntry& entry);
 
 }  // namespace modar

@@ -1048,18 +1048,21 @@ void validate_assets(FaultLog& log, const BundleParts& parts) {
 }
 
 Result<void> verify_sections(const BundleView& bundle) {
-  FaultLog log;
   for (const SectionEntry& entry : bundle.sections()) {
     const auto bytes = bundle.bytes().subspan(static_cast<std::size_t>(entry.offset),
                                               static_cast<std::size_t>(entry.size));
     if (XXH64(bytes.data(), bytes.size(), 0) == entry.hash) continue;
-    log.add(
-        Rule::kSectionHash, entry.offset,
-        "section " + std::to_string(&entry - bundle.sections().data()),
-        "it has " + std::to_string(entry.size) + " bytes of type " + std::to_string(entry.type));
-    return tl::unexpected(log.first());
+    return tl::unexpected(wrong_section(bundle, entry));
   }
   return {};
+}
+
+Error wrong_section(const BundleView& bundle, const SectionEntry& entry) {
+  FaultLog log;
+  log.add(Rule::kSectionHash, entry.offset,
+          "section " + std::to_string(&entry - bundle.sections().data()),
+          "it has " + std::to_string(entry.size) + " bytes of type " + std::to_string(entry.type));
+  return log.first();
 }
 
 }  // namespace modar

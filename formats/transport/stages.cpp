@@ -41,6 +41,39 @@ std::uint32_t first_shown(const BundleView& bundle, const TextureRecord& texture
   return level;
 }
 
+/// Of each model its coarsest stand-in, or all of it where it has none: bytes of the section of
+/// vertices or indices.
+std::vector<StageRange> shown_geometry(const BundleView& bundle, bool indices) {
+  std::vector<StageRange> shown;
+  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
+    const std::uint32_t stand_in = coarsest_stand_in(bundle, m);
+    const ChunkGroup group = bundle.chunk_group(stand_in == kNone ? m : stand_in);
+    const std::uint32_t vertex = bundle.layouts()[bundle.models()[m].layout].stride;
+    for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle.chunks()[group.first_chunk + c];
+      for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
+        const LevelRecord& level = bundle.levels()[chunk.first_level + l];
+        shown.push_back(
+            {indices ? level.index_offset : level.vertex_offset,
+             indices ? 2ull * level.index_count : std::uint64_t{level.vertex_count} * vertex});
+      }
+    }
+  }
+  return shown;
+}
+
+/// Levels of a texture that are shown first: bytes of its section.
+std::vector<StageRange> shown_blocks(const BundleView& bundle, std::uint32_t number) {
+  const TextureRecord& texture = bundle.textures()[number];
+  std::vector<StageRange> shown;
+  for (std::uint32_t l = first_shown(bundle, texture); l < texture.level_count; ++l) {
+    const TextureLevelRecord& level = bundle.texture_levels()[texture.first_level + l];
+    shown.push_back({level.offset, level.size});
+    if (level.alpha_offset != kNoOffset) shown.push_back({level.alpha_offset, level.size});
+  }
+  return shown;
+}
+
 class Planner {
  public:
   explicit Planner(const BundleView& bundle) : bundle_(bundle) {}
@@ -98,37 +131,13 @@ class Planner {
     for (const StageRange& range : rest) add(range);
   }
 
-  /// Of each model its coarsest stand-in, or all of it where it has none.
   void plan_geometry(const SectionEntry& entry, std::uint32_t stride, bool indices) {
-    std::vector<StageRange> shown;
-    for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
-      const std::uint32_t stand_in = coarsest_stand_in(bundle_, m);
-      const ChunkGroup group = bundle_.chunk_group(stand_in == kNone ? m : stand_in);
-      const std::uint32_t vertex = bundle_.layouts()[bundle_.models()[m].layout].stride;
-      for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
-        const ChunkRecord& chunk = bundle_.chunks()[group.first_chunk + c];
-        for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
-          const LevelRecord& level = bundle_.levels()[chunk.first_level + l];
-          shown.push_back(
-              {indices ? level.index_offset : level.vertex_offset,
-               indices ? 2ull * level.index_count : std::uint64_t{level.vertex_count} * vertex});
-        }
-      }
-    }
-    split(entry, stride, std::move(shown));
+    split(entry, stride, shown_geometry(bundle_, indices));
   }
 
   /// Levels from small to large, those that are shown together.
   void plan_texture(const SectionEntry& entry) {
-    const TextureRecord& texture = bundle_.textures()[entry.owner];
-    const std::uint32_t first = first_shown(bundle_, texture);
-    std::vector<StageRange> shown;
-    for (std::uint32_t l = first; l < texture.level_count; ++l) {
-      const TextureLevelRecord& level = bundle_.texture_levels()[texture.first_level + l];
-      shown.push_back({level.offset, level.size});
-      if (level.alpha_offset != kNoOffset) shown.push_back({level.alpha_offset, level.size});
-    }
-    split(entry, kBlockBytes, std::move(shown));
+    split(entry, kBlockBytes, shown_blocks(bundle_, entry.owner));
   }
 
   const BundleView& bundle_;
@@ -146,6 +155,57 @@ Record& writable(std::span<std::byte> bytes, const BundleView& bundle, const Rec
 
 std::vector<StageRange> stage_ranges(const BundleView& bundle) {
   return Planner(bundle).plan();
+}
+
+std::uint64_t gpu_start(const BundleView& bundle) {
+  std::uint64_t start = bundle.bytes().size();
+  for (const SectionEntry& entry : bundle.sections()) {
+    if (entry.type >= kFirstOfGpu) start = std::min(start, entry.offset);
+  }
+  return start;
+}
+
+Overlap overlap(std::uint64_t start, std::uint64_t size, std::uint64_t offset,
+                std::span<const std::byte> bytes) {
+  const std::uint64_t from = std::max(start, offset);
+  const std::uint64_t to = std::min(start + size, offset + bytes.size());
+  if (from >= to) return {};
+  return {from - start, bytes.subspan(static_cast<std::size_t>(from - offset),
+                                      static_cast<std::size_t>(to - from))};
+}
+
+std::vector<StageRange> kept_ranges(const BundleView& bundle) {
+  std::vector<StageRange> kept{{0, gpu_start(bundle)}};
+  const auto add = [&](std::span<const std::byte> section, std::uint64_t at, std::uint64_t size) {
+    kept.push_back({static_cast<std::uint64_t>(section.data() - bundle.bytes().data()) + at, size});
+  };
+  for (const bool indices : {false, true}) {
+    for (const StageRange& range : shown_geometry(bundle, indices)) {
+      add(indices ? bundle.indices() : bundle.vertices(), range.offset, range.size);
+    }
+  }
+  for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
+    for (const StageRange& range : shown_blocks(bundle, t)) {
+      add(bundle.texture_data(t), range.offset, range.size);
+    }
+  }
+  for (const SectionEntry& entry : bundle.sections()) {
+    if (entry.type != static_cast<std::uint32_t>(SectionType::kDrawOrder)) continue;
+    const LevelRecord& level = bundle.levels()[bundle.chunks()[entry.owner].first_level];
+    add(bundle.indices(), level.index_offset, 2ull * level.index_count);
+  }
+  return kept;
+}
+
+void use_stand_ins(std::span<std::byte> bytes, const BundleView& bundle) {
+  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
+    const std::uint32_t stand_in = coarsest_stand_in(bundle, m);
+    if (stand_in == kNone) continue;
+    const ChunkGroup group = bundle.chunk_group(stand_in);
+    ModelRecord& model = writable(bytes, bundle, bundle.models()[m]);
+    model.first_chunk = group.first_chunk;
+    model.chunk_count = group.chunk_count;
+  }
 }
 
 void show_coarsest(std::span<std::byte> bytes, const BundleView& bundle) {

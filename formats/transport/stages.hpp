@@ -19,6 +19,9 @@ inline constexpr std::uint32_t kShownSide = 256;
 /// Types of sections from here on are payloads; what lies before them are tables and small text.
 inline constexpr std::uint32_t kFirstPayload = 256;
 
+/// And from here on they are what GPUs draw from: vertices, indices, texture blocks.
+inline constexpr std::uint32_t kFirstOfGpu = static_cast<std::uint32_t>(SectionType::kVertices);
+
 /// Bytes of a bundle that are needed together.
 struct StageRange {
   std::uint64_t offset = 0;  ///< in the bundle
@@ -29,6 +32,28 @@ struct StageRange {
 
 /// All of a bundle but the zeros between sections, in the order of need. It reads tables only.
 std::vector<StageRange> stage_ranges(const BundleView& bundle);
+
+/// Where a bundle's vertices, indices and texture blocks begin: all else lies before.
+std::uint64_t gpu_start(const BundleView& bundle);
+
+/// Of bytes that begin at `offset`, those that lie in the `size` ones from `start` on, and where
+/// there; both count from the same place.
+struct Overlap {
+  std::uint64_t at = 0;
+  std::span<const std::byte> bytes;
+};
+Overlap overlap(std::uint64_t start, std::uint64_t size, std::uint64_t offset,
+                std::span<const std::byte> bytes);
+
+/// What a program needs to have in memory when vertices, indices and texture blocks are on the GPU:
+/// all that lies before them, what LoadStage::kShow shows, and the indices that a draw order sorts.
+/// Some bytes more than once; `stage` means nothing.
+std::vector<StageRange> kept_ranges(const BundleView& bundle);
+
+/// Gives each model that has stand-ins the chunks of the coarsest one in place of its own, for what
+/// reads the triangles of kept_ranges(). bytes: those that `bundle` is a view of. The caller keeps
+/// a copy of the section of models.
+void use_stand_ins(std::span<std::byte> bytes, const BundleView& bundle);
 
 /// Changes the tables of a bundle of which the last stage is missing, so that renderers made of it
 /// draw nothing of that: stand-ins in place of all chunks, textures from kShownSide on. bytes:

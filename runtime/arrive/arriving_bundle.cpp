@@ -6,8 +6,15 @@
 #include <utility>
 
 #include "formats/bundle_view.hpp"
+#include "formats/check.hpp"
 #include "formats/transport/coded_bytes.hpp"
 #include "formats/transport/stages.hpp"
+
+#ifdef __EMSCRIPTEN__
+#include <unistd.h>
+#endif
+#define XXH_INLINE_ALL
+#include <xxhash.h>
 
 namespace modar {
 namespace {
@@ -40,10 +47,13 @@ bool needs_no_library(PieceForm form) {
 /// Zeros; untouched where they are zeros already, so that pages without pieces take no memory.
 std::byte* zeros(std::size_t size) {
 #ifdef __EMSCRIPTEN__
-  // Its calloc() writes them.
+  // Its calloc() writes them. What lies beyond the heap's end is zeros.
+  const auto* const end = static_cast<const std::byte*>(sbrk(0));
   auto* bytes = static_cast<std::byte*>(std::malloc(size));
-  for (std::size_t i = 0; bytes != nullptr && i < size; ++i) {
-    if (bytes[i] != std::byte{0}) bytes[i] = std::byte{0};
+  if (bytes != nullptr && bytes < end) {
+    std::fill(bytes,
+              bytes + std::min<std::ptrdiff_t>(end - bytes, static_cast<std::ptrdiff_t>(size)),
+              std::byte{0});
   }
   return bytes;
 #else
@@ -114,19 +124,85 @@ bool ArrivingBundle::put(std::uint64_t offset, std::span<const std::byte> raw) {
 }
 
 Result<void> ArrivingBundle::show_coarsest() {
-  MODAR_ASSIGN(const BundleView view, BundleView::open(bytes()));
-  std::uint64_t end = size_;
-  for (const SectionEntry& entry : view.sections()) {
-    if (entry.type >= kFirstPayload) end = std::min(end, entry.offset);
+  if (coarse_) return {};
+  if (tables_.empty()) {
+    MODAR_ASSIGN(const BundleView view, BundleView::open(bytes()));
+    std::uint64_t end = size_;
+    for (const SectionEntry& entry : view.sections()) {
+      if (entry.type >= kFirstPayload) end = std::min(end, entry.offset);
+    }
+    tables_.assign(bytes_.get(), bytes_.get() + end);
+    modar::show_coarsest(bytes(), view);
+  } else {
+    std::swap_ranges(tables_.begin(), tables_.end(), bytes_.get());
   }
-  tables_.assign(bytes_.get(), bytes_.get() + end);
-  modar::show_coarsest(bytes(), view);
+  coarse_ = true;
   return {};
 }
 
 void ArrivingBundle::show_all() {
-  if (!tables_.empty()) std::memcpy(bytes_.get(), tables_.data(), tables_.size());
-  tables_.clear();
+  if (coarse_) std::swap_ranges(tables_.begin(), tables_.end(), bytes_.get());
+  coarse_ = false;
+}
+
+struct ArrivingBundle::Hash {
+  XXH64_state_t state;
+};
+
+void ArrivingBundle::FreeHash::operator()(Hash* hash) const {
+  delete hash;
+}
+
+Result<void> ArrivingBundle::keep(bool in_order) {
+  MODAR_ASSIGN(view_, BundleView::open(bytes()));
+  kept_ = kept_ranges(view_);
+  hash_.reset(in_order ? new Hash : nullptr);
+  looked_at_ = 0;
+  const auto sections = view_.sections();
+  while (looked_at_ < sections.size() && sections[looked_at_].type < kFirstOfGpu) ++looked_at_;
+  return {};
+}
+
+Result<void> ArrivingBundle::pass(std::uint64_t offset, std::span<const std::byte> raw) {
+  for (const StageRange& range : kept_) {
+    const Overlap part = overlap(range.offset, range.size, offset, raw);
+    put(range.offset + part.at, part.bytes);
+  }
+  return hash_ != nullptr ? look_at(offset, raw) : Result<void>();
+}
+
+Result<void> ArrivingBundle::look_at(std::uint64_t offset, std::span<const std::byte> raw) {
+  const auto sections = view_.sections();
+  while (looked_at_ < sections.size()) {
+    const SectionEntry& entry = sections[looked_at_];
+    const std::uint64_t end = entry.offset + entry.size;
+    if (offset + raw.size() <= entry.offset && end > entry.offset) break;
+    const std::uint64_t from = std::max(entry.offset, offset);
+    const std::uint64_t to = std::min(end, offset + raw.size());
+    if (from == entry.offset || entry.size == 0) XXH64_reset(&hash_->state, 0);
+    if (from < to) {
+      XXH64_update(&hash_->state, raw.data() + (from - offset),
+                   static_cast<std::size_t>(to - from));
+    }
+    if (to < end) break;
+    if (XXH64_digest(&hash_->state) != entry.hash)
+      return tl::unexpected(wrong_section(view_, entry));
+    ++looked_at_;
+  }
+  return {};
+}
+
+Result<void> ArrivingBundle::verify() const {
+  for (const SectionEntry& entry : view_.sections()) {
+    if (entry.type >= kFirstOfGpu) break;
+    const std::span<const std::byte> section(bytes_.get() + entry.offset,
+                                             static_cast<std::size_t>(entry.size));
+    if (raw_hash(section) != entry.hash) return tl::unexpected(wrong_section(view_, entry));
+  }
+  if (hash_ != nullptr && looked_at_ < view_.sections().size()) {
+    return tl::unexpected(wrong_section(view_, view_.sections()[looked_at_]));  // has not come
+  }
+  return {};
 }
 
 }  // namespace modar

@@ -183,6 +183,28 @@ modar_renderer* modar_renderer_create(const modar_bundle* bundle, const char* de
   return made.release();
 }
 
+modar_renderer* modar_renderer_create_part(const modar_bundle* bundle, int comes,
+                                           modar_error* error) {
+  if (bundle == nullptr) {
+    modar::hand_over(modar::missing("bundle"), error);
+    return nullptr;
+  }
+  auto renderer = modar::Renderer::create_part(bundle->view, modar::probe_gl_caps(), comes != 0);
+  if (!renderer) {
+    modar::hand_over(renderer.error(), error);
+    return nullptr;
+  }
+  auto made = std::make_unique<modar_renderer>();
+  made->view = bundle->view;
+  made->renderer = std::move(*renderer);
+  return made.release();
+}
+
+void modar_renderer_put(modar_renderer* renderer, uint64_t offset, const void* bytes, size_t size) {
+  if (renderer == nullptr || bytes == nullptr) return;
+  renderer->renderer->put(offset, {static_cast<const std::byte*>(bytes), size});
+}
+
 void modar_renderer_destroy(modar_renderer* renderer) {
   delete renderer;
 }

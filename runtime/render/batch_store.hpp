@@ -58,6 +58,9 @@ class BatchStore {
   BatchStore(const BundleView& bundle, std::span<const VertexFormat> formats, std::uint64_t budget)
       : bundle_(bundle), formats_(formats), budget_(budget) {}
 
+  /// From now on find() answers nullptr.
+  void make_none() { budget_ = 0; }
+
   /// A batch that holds at least the asked copies of each part, made if there is none. The parts
   /// together have at most kBatchVertices vertices and `slots` copies. The answer lives until the
   /// next call; nullptr where the budget has no room for it.

@@ -142,6 +142,35 @@ void GeometryStore::upload_whole() {
   resident_bytes_ = (rewrites_ ? vertex_total_ : vertices.size()) + indices.size();
 }
 
+Result<void> GeometryStore::expect() {
+  if (rewrites_) {
+    return fail(ExitCode::kUnsupported, "gl.halves", "vertices",
+                "this context reads no half floats, and vertices are rewritten for it",
+                "keep the whole bundle in memory");
+  }
+  resident_bytes_ = bundle_.vertices().size() + bundle_.indices().size();
+  whole_vertices_ = make_buffer(GL_ARRAY_BUFFER);
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(bundle_.vertices().size()), nullptr,
+               GL_STATIC_DRAW);
+  whole_indices_ = make_buffer(GL_ELEMENT_ARRAY_BUFFER);
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(bundle_.indices().size()), nullptr,
+               GL_STATIC_DRAW);
+  return {};
+}
+
+void GeometryStore::put(bool indices, std::uint64_t offset, std::span<const std::byte> bytes) {
+  const GLenum target = indices ? GL_ELEMENT_ARRAY_BUFFER : GL_ARRAY_BUFFER;
+  glBindBuffer(target, indices ? whole_indices_ : whole_vertices_);
+  glBufferSubData(target, static_cast<GLintptr>(offset), static_cast<GLsizeiptr>(bytes.size()),
+                  bytes.data());
+  uploaded_bytes_ += bytes.size();
+}
+
+void GeometryStore::upload_when_used() {
+  streams_ = true;
+  if (budget_ == 0) budget_ = ~std::uint64_t{0};
+}
+
 /// Copies a range to `offset` of the buffer that is bound to `target`.
 void GeometryStore::fill(const Range& range, GLenum target, std::uint64_t offset) {
   const bool is_vertices = range.layout != kNone;

@@ -32,6 +32,13 @@ class GeometryStore {
   /// "level.index" where an index refers to a vertex that its level lacks: GL need not bound what a
   /// draw call reads. Levels that are uploaded later are checked then, and not drawn.
   Result<void> upload();
+  /// In place of upload(), where the bytes come later: makes the buffers for put(). Errors:
+  /// kUnsupported "gl.halves" where vertices would have to be rewritten on their way.
+  Result<void> expect();
+  /// Bytes of the section of indices or vertices from `offset` on, once expect() has made room.
+  void put(bool indices, std::uint64_t offset, std::span<const std::byte> bytes);
+  /// In place of upload(), where not all bytes are there: levels are uploaded when they are used.
+  void upload_when_used();
   /// Deletes the GL buffers.
   void release(GlState& gl);
 

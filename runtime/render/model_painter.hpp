@@ -55,6 +55,8 @@ class ModelPainter {
 
   /// One a chunk of the bundle.
   [[nodiscard]] std::span<const ChunkSetup> setups() const { return setups_; }
+  /// Copies of small meshes never share draw calls: their bytes may be missing.
+  void make_no_batches() { batches_.make_none(); }
   [[nodiscard]] std::uint64_t batch_bytes() const { return batches_.bytes(); }
 
   /// Draws in the list's order, and triangles of chunks with a draw order from far to near. What

@@ -10,6 +10,7 @@
 #include <glm/mat2x2.hpp>
 #include <glm/matrix.hpp>
 
+#include "formats/transport/stages.hpp"
 #include "runtime/render/draw_list.hpp"
 #include "runtime/render/geometry_store.hpp"
 #include "runtime/render/gl.hpp"
@@ -160,6 +161,21 @@ struct Renderer::State {
     MODAR_TRY(textures.upload(
         caps.gpu_memory == 0 ? 0 : std::max<std::uint64_t>(1, caps.gpu_memory / 2)));
     MODAR_TRY(geometry.upload());
+    return finish_upload();
+  }
+
+  /// In place of upload(): what put() fills.
+  Result<void> expect() {
+    extensions = load_gl_extensions(caps);
+    const SavedGlState saved(extensions, !options.exclusive_context);
+    MODAR_TRY(textures.expect(0));
+    MODAR_TRY(geometry.expect());
+    // Batches are copied from the bundle's bytes.
+    if (!bundle.stand_ins().empty()) painter.make_no_batches();
+    return finish_upload();
+  }
+
+  Result<void> finish_upload() {
     MODAR_TRY(painter.create(textures, extensions, caps));
     MODAR_TRY(background.create());
     MODAR_TRY(ground.create(bundle));
@@ -271,6 +287,33 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const BundleView& bundle, con
   std::unique_ptr<Renderer> renderer(new Renderer(std::make_unique<State>(bundle, caps)));
   MODAR_TRY(renderer->state_->upload());
   return renderer;
+}
+
+Result<std::unique_ptr<Renderer>> Renderer::create_part(const BundleView& bundle,
+                                                        const GlCaps& caps, bool comes) {
+  std::unique_ptr<Renderer> renderer(new Renderer(std::make_unique<State>(bundle, caps)));
+  if (!comes) renderer->state_->geometry.upload_when_used();
+  MODAR_TRY(comes ? renderer->state_->expect() : renderer->state_->upload());
+  return renderer;
+}
+
+void Renderer::put(std::uint64_t offset, std::span<const std::byte> bytes) {
+  State& s = *state_;
+  const SavedGlState saved(s.extensions, true);
+  const auto start = [&](std::span<const std::byte> section) {
+    return static_cast<std::uint64_t>(section.data() - s.bundle.bytes().data());
+  };
+  for (const bool indices : {false, true}) {
+    const auto section = indices ? s.bundle.indices() : s.bundle.vertices();
+    const Overlap part = overlap(start(section), section.size(), offset, bytes);
+    if (!part.bytes.empty()) s.geometry.put(indices, part.at, part.bytes);
+  }
+  for (std::uint32_t t = 0; t < s.bundle.textures().size(); ++t) {
+    const auto section = s.bundle.texture_data(t);
+    const Overlap part = overlap(start(section), section.size(), offset, bytes);
+    if (!part.bytes.empty()) s.textures.put(t, part.at, part.bytes);
+  }
+  s.gl.reset();
 }
 
 Renderer::Renderer(std::unique_ptr<State> state) : state_(std::move(state)) {}

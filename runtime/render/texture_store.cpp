@@ -5,6 +5,7 @@
 
 #include "formats/base/bits.hpp"
 #include "formats/texture_format.hpp"
+#include "formats/transport/stages.hpp"
 #include "modar/mapped_file.hpp"
 #include "runtime/render/plane_painter.hpp"
 
@@ -121,39 +122,10 @@ Result<void> TextureStore::upload(std::uint64_t budget) {
   return {};
 }
 
-GLuint TextureStore::make(std::uint32_t texture, bool alpha) {
-  const TextureRecord& record = bundle_.textures()[texture];
-  const TextureFormatInfo& format = *find_texture_format(record.format);  // the view checked it
-  const std::span<const std::byte> data = bundle_.texture_data(texture);
-  const bool mips = mipmapped(record);
+GLuint TextureStore::begin(const TextureRecord& record) {
   GLuint id = 0;
   glGenTextures(1, &id);
   glBindTexture(GL_TEXTURE_2D, id);
-  const std::uint32_t first = first_level_[texture];
-  const std::uint32_t end = mips ? record.level_count : first + 1;
-  for (std::uint32_t i = first; i < end; ++i) {
-    const TextureLevelRecord& level = bundle_.texture_levels()[record.first_level + i];
-    const std::uint64_t offset = alpha ? level.alpha_offset : level.offset;
-    const std::span<const std::byte> blocks =
-        data.subspan(static_cast<std::size_t>(offset), static_cast<std::size_t>(level.size));
-    const GLint target_level = static_cast<GLint>(i - first);
-    const GLsizei width = static_cast<GLsizei>(level.width);
-    const GLsizei height = static_cast<GLsizei>(level.height);
-    if (reads(record)) {
-      const GLenum gl_format =
-          format.format == TextureFormat::kEtc1Rgb ? etc1_format_ : format.gl_format;
-      glCompressedTexImage2D(GL_TEXTURE_2D, target_level, gl_format, width, height, 0,
-                             static_cast<GLsizei>(level.size), blocks.data());
-      uploaded_bytes_ += level.size;
-    } else {
-      const std::size_t bytes = std::size_t{level.width} * level.height * 3;
-      decoded_.resize(std::max(decoded_.size(), bytes));
-      format.decode(blocks, level.width, level.height, 3, decoded_);
-      glTexImage2D(GL_TEXTURE_2D, target_level, GL_RGB, width, height, 0, GL_RGB, GL_UNSIGNED_BYTE,
-                   decoded_.data());
-      uploaded_bytes_ += bytes;
-    }
-  }
   // ES 2.0 repeats power-of-two textures only, and shows others black where it is asked to.
   const bool repeat =
       (record.flags & kTextureRepeat) != 0 && (npot_mipmaps_ || power_of_two(record));
@@ -161,8 +133,102 @@ GLuint TextureStore::make(std::uint32_t texture, bool alpha) {
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, wrap);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, wrap);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, mips ? GL_LINEAR_MIPMAP_LINEAR : GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER,
+                  mipmapped(record) ? GL_LINEAR_MIPMAP_LINEAR : GL_LINEAR);
   return id;
+}
+
+GLuint TextureStore::make(std::uint32_t texture, bool alpha) {
+  const TextureRecord& record = bundle_.textures()[texture];
+  const std::span<const std::byte> data = bundle_.texture_data(texture);
+  const GLuint id = begin(record);
+  const std::uint32_t first = first_level_[texture];
+  const std::uint32_t end = mipmapped(record) ? record.level_count : first + 1;
+  for (std::uint32_t i = first; i < end; ++i) {
+    const TextureLevelRecord& level = bundle_.texture_levels()[record.first_level + i];
+    const std::uint64_t offset = alpha ? level.alpha_offset : level.offset;
+    send(texture, i,
+         data.subspan(static_cast<std::size_t>(offset), static_cast<std::size_t>(level.size)));
+  }
+  return id;
+}
+
+void TextureStore::send(std::uint32_t texture, std::uint32_t number,
+                        std::span<const std::byte> blocks) {
+  const TextureRecord& record = bundle_.textures()[texture];
+  const TextureFormatInfo& format = *find_texture_format(record.format);  // the view checked it
+  const TextureLevelRecord& level = bundle_.texture_levels()[record.first_level + number];
+  const GLint target_level = static_cast<GLint>(number - first_level_[texture]);
+  const GLsizei width = static_cast<GLsizei>(level.width);
+  const GLsizei height = static_cast<GLsizei>(level.height);
+  if (reads(record)) {
+    const GLenum gl_format =
+        format.format == TextureFormat::kEtc1Rgb ? etc1_format_ : format.gl_format;
+    glCompressedTexImage2D(GL_TEXTURE_2D, target_level, gl_format, width, height, 0,
+                           static_cast<GLsizei>(level.size), blocks.data());
+    uploaded_bytes_ += level.size;
+  } else {
+    const std::size_t bytes = std::size_t{level.width} * level.height * 3;
+    decoded_.resize(std::max(decoded_.size(), bytes));
+    format.decode(blocks, level.width, level.height, 3, decoded_);
+    glTexImage2D(GL_TEXTURE_2D, target_level, GL_RGB, width, height, 0, GL_RGB, GL_UNSIGNED_BYTE,
+                 decoded_.data());
+    uploaded_bytes_ += bytes;
+  }
+}
+
+Result<void> TextureStore::expect(std::uint64_t budget) {
+  MODAR_TRY(choose_levels(budget));
+  for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) {
+    if (!used_[t]) continue;
+    const TextureRecord& record = bundle_.textures()[t];
+    colours_[t] = begin(record);
+    if ((record.flags & kTextureAlpha) != 0) alphas_[t] = begin(record);
+  }
+  return {};
+}
+
+void TextureStore::put(std::uint32_t texture, std::uint64_t offset,
+                       std::span<const std::byte> bytes) {
+  if (!used_[texture]) return;
+  const TextureRecord& record = bundle_.textures()[texture];
+  const std::uint32_t first = first_level_[texture];
+  const std::uint32_t end = mipmapped(record) ? record.level_count : first + 1;
+  for (std::uint32_t i = first; i < end; ++i) {
+    const TextureLevelRecord& level = bundle_.texture_levels()[record.first_level + i];
+    for (const bool alpha : {false, true}) {
+      const std::uint64_t start = alpha ? level.alpha_offset : level.offset;
+      const GLuint name = alpha ? alphas_[texture] : colours_[texture];
+      if (name == 0 || start == kNoOffset) continue;
+      const Overlap part = overlap(start, level.size, offset, bytes);
+      if (!part.bytes.empty()) take(texture, name, i, part.at, part.bytes);
+    }
+  }
+}
+
+void TextureStore::take(std::uint32_t texture, GLuint name, std::uint32_t level, std::uint64_t at,
+                        std::span<const std::byte> bytes) {
+  const TextureRecord& record = bundle_.textures()[texture];
+  const std::uint64_t size = bundle_.texture_levels()[record.first_level + level].size;
+  auto coming = std::find_if(coming_.begin(), coming_.end(), [&](const Coming& each) {
+    return each.name == name && each.level == level;
+  });
+  if (coming == coming_.end()) {
+    if (at != 0) return;  // its start is missing
+    coming = coming_.insert(coming_.end(), Coming{name, level, {}});
+    if (bytes.size() < size) coming->bytes.reserve(static_cast<std::size_t>(size));
+  }
+  if (coming->bytes.size() != at) return;
+  std::span<const std::byte> blocks = bytes;
+  if (bytes.size() < size) {
+    coming->bytes.insert(coming->bytes.end(), bytes.begin(), bytes.end());
+    if (coming->bytes.size() < size) return;
+    blocks = coming->bytes;
+  }
+  glBindTexture(GL_TEXTURE_2D, name);
+  send(texture, level, blocks);
+  coming_.erase(coming);
+  decoded_ = {};
 }
 
 void TextureStore::release(GlState& gl) {

@@ -22,6 +22,12 @@ class TextureStore {
   /// limit are left out; so are the finest ones while all together are larger than `budget` bytes
   /// (0: no limit). Errors: kUnsupported "gl.texture-size" where no level is small enough.
   Result<void> upload(std::uint64_t budget);
+  /// In place of upload(), where the blocks come later: makes the textures for put(). Errors: as
+  /// upload().
+  Result<void> expect(std::uint64_t budget);
+  /// Bytes of a texture's section from `offset` on. A level is uploaded when its last byte is here;
+  /// until then its bytes, which come in their order, are kept.
+  void put(std::uint32_t texture, std::uint64_t offset, std::span<const std::byte> bytes);
   void release(GlState& gl);
 
   /// 0 where there is none.
@@ -41,7 +47,21 @@ class TextureStore {
   [[nodiscard]] std::uint64_t bytes_from(std::uint32_t texture, std::uint32_t first) const;
   [[nodiscard]] bool mipmapped(const TextureRecord& texture) const;
   Result<void> choose_levels(std::uint64_t budget);
+  /// A texture without levels, bound.
+  GLuint begin(const TextureRecord& texture);
   GLuint make(std::uint32_t texture, bool alpha);
+  /// Uploads a level (counted from the bundle's finest) to the texture that is bound.
+  void send(std::uint32_t texture, std::uint32_t level, std::span<const std::byte> blocks);
+
+  /// A level of which some bytes have come.
+  struct Coming {
+    GLuint name = 0;
+    std::uint32_t level = 0;
+    std::vector<std::byte> bytes;
+  };
+  /// Some bytes of a level from `at` on, of its texture `name`.
+  void take(std::uint32_t texture, GLuint name, std::uint32_t level, std::uint64_t at,
+            std::span<const std::byte> bytes);
 
   const BundleView& bundle_;
   std::uint32_t formats_ = 0;  ///< as in GlCaps
@@ -54,6 +74,7 @@ class TextureStore {
   std::vector<GLuint> alphas_;
   std::vector<Rgb8> means_;
   std::vector<std::uint8_t> decoded_;
+  std::vector<Coming> coming_;
   std::uint64_t bytes_ = 0;
   std::uint64_t uploaded_bytes_ = 0;
 };

@@ -1,4 +1,5 @@
 // A bundle on its way: a raw one comes whole, a packed one (formats/shipping.md) piece by piece, in the order of need.
+import { ENTRY_BYTES, HEADER_BYTES } from './bundle.js';
 import { ModarError } from './engine.js';
 
 /** Times that something is asked for again, and seconds before the second time: a phone's connection breaks now and then. Set by hand. */
@@ -7,6 +8,10 @@ const WAIT_S = 1;
 /** As formats/transport/recipe.hpp has them. */
 const MAGIC = [0x89, 0x4d, 0x4f, 0x52, 0x0d, 0x0a, 0x1a, 0x0a];
 const RECIPE_BYTES = 64, PIECE_BYTES = 64, MOST_PIECES = 1 << 20;
+/** More are refused by the engine, for their bytes. Then types of sections, as formats/sections.hpp has them. */
+const MOST_SECTIONS = 1 << 16, MEDIA = 263, FIRST_OF_GPU = 512;
+/** Of a raw bundle's bytes, passed on together: as large as pieces are. */
+const PASSED = 256 << 10;
 /** A form, there: a packed tracker record, most of a first stage, which is unpacked while it comes. */
 const PACKED_RECORD = 7;
 /**
@@ -42,6 +47,8 @@ export class Source {
   /** Came, and was not taken. */
   #chunk = new Uint8Array();
   #taken = 0;
+  /** Bytes before it are not asked for. */
+  #first = 0;
   /** Where an address says so (?first=...): ends of bytes that are asked for alone, since the rest can wait until they are there. */
   #stops = [];
   /** Of the second stop's bytes, as soon as those of the first one are there: the promise of #open(). */
@@ -58,7 +65,7 @@ export class Source {
    */
   constructor(bundle, copy = null) {
     this.#given = typeof bundle !== 'string' && !(bundle instanceof URL);
-    this.#bundle = this.#given ? new Uint8Array(bundle) : bundle;
+    this.#bundle = this.#given && !(bundle instanceof Uint8Array) ? new Uint8Array(bundle) : bundle;
     const first = this.#given ? 0 : Number(/[?&]first=(\d+)/.exec(bundle)?.[1] ?? 0);
     if (first > 0) this.#stops = [Math.min(START, first), first];
     this.#copy = copy;
@@ -100,7 +107,7 @@ export class Source {
 
   async #read() {
     if (!this.#reader) {
-      const again = this.#taken > 0 && !this.#stops.includes(this.#taken);
+      const again = this.#taken > this.#first && !this.#stops.includes(this.#taken);
       const second = this.#taken === this.#stops[0] && this.#second;
       this.#second = null;
       const { reader, chunk } = await (second || this.#open(this.#taken, again));
@@ -157,6 +164,15 @@ export class Source {
     return new Uint8Array(await new Blob(parts).arrayBuffer());
   }
 
+  /** The same file from a place on, once more. */
+  from(at) {
+    const other = new Source(this.#bundle);
+    other.#taken = other.#first = at;
+    other.total = this.total;
+    other.patient = true;
+    return other;
+  }
+
   /** Bytes that came before, once more. */
   async again(from, count) {
     this.#endCopy(false);  // it has what was no good
@@ -184,9 +200,75 @@ export class Source {
 
 export const isPacked = (start) => MAGIC.every((byte, i) => start[i] === byte);
 
+/** A raw bundle on its way: what it is opened with and its patterns, then, in the file's order, what is drawn from. */
+export class RawArrival {
+  #source;
+  #at = 0;
+  /** Where the last stage begins. */
+  #rest = 0;
+  inOrder = true;
+  found = [];
+  size = 0;
+
+  constructor(source) {
+    this.#source = source;
+  }
+
+  /** Brings all that lies before vertices, indices and blocks. start: of the file. */
+  async begin(start) {
+    let head = start;
+    const grow = async (to) => {
+      const more = await this.#source.take(to - head.length, false);
+      head = new Uint8Array(await new Blob([head, more]).arrayBuffer());
+      return new DataView(head.buffer);
+    };
+    let view = await grow(HEADER_BYTES);
+    const count = head.length < HEADER_BYTES ? 0 : view.getUint32(12, true);
+    const tables = HEADER_BYTES + ENTRY_BYTES * Math.min(count, MOST_SECTIONS);
+    view = await grow(tables);
+    let end = Infinity, media = Infinity;
+    for (let entry = HEADER_BYTES; entry < tables && tables <= head.length; entry += ENTRY_BYTES) {
+      const type = view.getUint32(entry, true), at = Number(view.getBigUint64(entry + 16, true));
+      if (type >= FIRST_OF_GPU) end = Math.min(end, at);
+      else if (type === MEDIA) media = Math.min(media, at);
+    }
+    if (end > head.length) await grow(end);
+    this.#at = this.#rest = head.length;
+    // What is no bundle, or has no models, is refused or opened as it is.
+    this.size = end < Infinity && end <= head.length ? Number(view.getBigUint64(16, true)) : head.length;
+    this.found = [{ offset: 0, bytes: head }];
+    this.#source.total = this.size;
+    this.tracked = [{ offset: 0, bytes: head.slice(0, media) }];  // its own memory: it is copied whole
+  }
+
+  /** take(offset, bytes) */
+  async bring(stage, take) {
+    if (stage !== STAGE.refine) return;
+    while (this.#at < this.size) {
+      const bytes = await this.#source.take(Math.min(PASSED, this.size - this.#at));
+      take(this.#at, bytes);
+      this.#at += bytes.length;
+    }
+    this.close();
+  }
+
+  /** The same again, for the last stage. */
+  async again() {
+    const other = new RawArrival(this.#source.from(this.#rest));
+    other.#at = other.#rest = this.#rest;
+    return Object.assign(other, { size: this.size });
+  }
+
+  close() {
+    this.#source.close();
+  }
+}
+
 export class Arrival {
   #source;
-  /** Calls of a worker that decodes. */
+  #recipe;
+  /** Makes #decoder: calls of a worker that decodes. */
+  #openDecoder;
   #decoder;
   /** Of the recipe: {index, at, stored, offset, size, form, stage}. */
   #pieces = [];
@@ -196,9 +278,10 @@ export class Arrival {
   /** Of the bundle, bytes. */
   size = 0;
 
-  constructor(source, decoder) {
+  constructor(source, openDecoder) {
     this.#source = source;
-    this.#decoder = decoder;
+    this.#openDecoder = openDecoder;
+    this.#decoder = openDecoder();
   }
 
   /** Brings the recipe and what patterns are found with. start: of the file. */
@@ -212,6 +295,7 @@ export class Arrival {
     recipe.set(await this.#source.take(PIECE_BYTES * count), RECIPE_BYTES);
     await this.#tried(() => this.#decoder.ask({ type: 'recipe', bytes: recipe }),
       async () => { recipe = await this.#source.again(0, recipe.length); });
+    this.#recipe = recipe;
     this.#read(new DataView(recipe.buffer));
     await this.bring(STAGE.find, (offset, bytes) => this.found.push({ offset, bytes }));
   }
@@ -269,6 +353,18 @@ export class Arrival {
     if (this.#next < this.#pieces.length) return;
     await this.#source.take(1, false).catch(() => {});  // to its end: then the browser keeps it
     this.close(true);
+  }
+
+  /** The same again, for the last stage. */
+  async again() {
+    const next = this.#pieces.findIndex((piece) => piece.stage === STAGE.refine);
+    const other = new Arrival(this.#source.from(this.#pieces[next]?.at ?? this.#source.total), this.#openDecoder);
+    other.#next = next < 0 ? this.#pieces.length : next;
+    Object.assign(other, { size: this.size });
+    other.#pieces = this.#pieces;
+    other.#recipe = this.#recipe;
+    await other.#decoder.ask({ type: 'recipe', bytes: this.#recipe });
+    return other;
   }
 
   close(whole = false) {

@@ -1,8 +1,8 @@
 // What a page shows of a bundle besides its models: texts and pictures of its patterns. The engine has opened and verified these
 // bytes; formats/bundle.md says how they lie.
 
-const HEADER_BYTES = 64;
-const ENTRY_BYTES = 48;
+export const HEADER_BYTES = 64;
+export const ENTRY_BYTES = 48;
 const NO_OWNER = 0xffffffff;
 const META = 2, TRACKER_RECORD = 258, PATTERN_COLOURS = 259, PATTERN_SHAPE = 261;
 

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -57,6 +58,8 @@ struct Engine {
   modar_bundle* bundle = nullptr;
   modar_tracker* tracker = nullptr;
   modar_renderer* renderer = nullptr;
+  modar_renderer* coming = nullptr;  ///< that web_pass() fills
+  bool in_memory = false;            ///< all of the bundle is, not what kept_ranges() names alone
   modar_camera camera = modar::sized<modar_camera>();
   double focal_sigma = 0;    ///< 0 where it is not estimated
   WebPose* poses = nullptr;  ///< one a pattern, with room for kMostOwn more
@@ -143,6 +146,36 @@ modar::RecordUnpacker* begun_of(uint32_t index, const void* stored) {
   return same ? &engine.begun->unpacker : nullptr;
 }
 
+/// The bundle's own tables, for as long as it lives.
+struct AllShown {
+  AllShown() : coarse(!engine.arriving->shows_all()) { engine.arriving->show_all(); }
+  ~AllShown() {
+    if (coarse) static_cast<void>(engine.arriving->show_coarsest());
+  }
+  AllShown(const AllShown&) = delete;
+  AllShown& operator=(const AllShown&) = delete;
+  bool coarse;
+};
+
+/// In place of the renderer before. fixed: 1 where its light does not follow web_look(). null: it
+/// could not be made.
+int use_renderer(modar_renderer* renderer, int fixed) {
+  modar_renderer_destroy(std::exchange(engine.renderer, renderer));
+  if (renderer == nullptr) return engine.error.status;
+  auto options = modar::sized<modar_render_options>();
+  modar_render_options_default(&options);
+  options.exclusive = 1;
+  options.fixed_light = fixed;
+  modar_renderer_set_options(renderer, &options);
+  return 0;
+}
+
+/// For what reads triangles: of models whose own are on the GPU alone, those of stand-ins.
+template <class Read>
+auto with_triangles(const Read& read) {
+  return engine.in_memory ? read() : engine.arriving->with_stand_ins(read);
+}
+
 /// A canvas that a frame of web_camera() covers.
 modar_surface surface_of(int width, int height, int mirror) {
   auto surface = modar::sized<modar_surface>();
@@ -218,24 +251,59 @@ EMSCRIPTEN_KEEPALIVE void* web_arrive(size_t size) {
   engine.arriving = modar::ArrivingBundle::create(size);
   return engine.arriving == nullptr ? nullptr : engine.arriving->bytes().data();
 }
-/// What web_upload() uploads of a bundle that arrives: 0: the coarsest of everything; 1: all of it,
-/// which is verified.
-EMSCRIPTEN_KEEPALIVE int web_show(int all) {
-  if (all == 0) {
-    const auto shown = engine.arriving->show_coarsest();
-    return shown ? 0 : failed(shown.error());
+/// Begins the last stage of the bundle, which web_pass() is given. in_order: 1 where its bytes come
+/// as a file's do, from gpu_start() on; 0 where they are pieces, and what is shown before them is
+/// there.
+EMSCRIPTEN_KEEPALIVE int web_begin_rest(int in_order) {
+  const AllShown shown;
+  const auto kept = engine.arriving->keep(in_order != 0);
+  if (!kept) return failed(kept.error());
+  modar_renderer_destroy(engine.coming);
+  // Null where vertices have to be rewritten for this context: then all stays in memory.
+  engine.coming = modar_renderer_create_part(engine.bundle, 1, nullptr);
+  if (in_order != 0) return 0;
+  for (const modar::StageRange& range : engine.arriving->kept()) {
+    modar_renderer_put(engine.coming, range.offset, engine.arriving->bytes().data() + range.offset,
+                       static_cast<size_t>(range.size));
+  }
+  return 0;
+}
+/// Bytes of the last stage.
+EMSCRIPTEN_KEEPALIVE int web_pass(double at, const void* bytes, size_t size) {
+  const auto offset = static_cast<uint64_t>(at);
+  const std::span some(static_cast<const std::byte*>(bytes), size);
+  const AllShown shown;
+  modar_renderer_put(engine.coming, offset, bytes, size);
+  if (engine.coming == nullptr) engine.arriving->put(offset, some);
+  const auto passed = engine.arriving->pass(offset, some);
+  return passed ? 0 : failed(passed.error());
+}
+/// From now on the coarsest of everything is drawn, which has come. fixed: see use_renderer().
+EMSCRIPTEN_KEEPALIVE int web_show_coarse(int fixed) {
+  const auto shown = engine.arriving->show_coarsest();
+  if (!shown) return failed(shown.error());
+  return use_renderer(modar_renderer_create_part(engine.bundle, 0, &engine.error), fixed);
+}
+/// From now on all of it is drawn, which has come.
+EMSCRIPTEN_KEEPALIVE int web_show_all(int fixed) {
+  {
+    const AllShown shown;
+    const auto verified = engine.arriving->verify();
+    if (!verified) return failed(verified.error());
   }
   engine.arriving->show_all();
-  return modar_bundle_verify(engine.bundle, &engine.error);
+  engine.in_memory = engine.coming == nullptr;
+  if (engine.in_memory)
+    return use_renderer(modar_renderer_create(engine.bundle, nullptr, 0, &engine.error), fixed);
+  return use_renderer(std::exchange(engine.coming, nullptr), fixed);
 }
 
-/// Opens the bundle; its bytes, of web_reserve() or web_arrive(), stay in use. whole: 0 where no
-/// more is there than what opening it needs. 0, or the status of an error.
-EMSCRIPTEN_KEEPALIVE int web_open(const void* bytes, size_t size, int whole) {
-  engine.bundle = modar_bundle_open_bytes(bytes, size, &engine.error);
+/// Opens the bundle of web_arrive(), of which as much is there as that needs. 0, or the status of
+/// an error.
+EMSCRIPTEN_KEEPALIVE int web_open() {
+  const auto bytes = engine.arriving->bytes();
+  engine.bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), &engine.error);
   if (engine.bundle == nullptr) return engine.error.status;
-  const int damaged = whole != 0 ? modar_bundle_verify(engine.bundle, &engine.error) : 0;
-  if (damaged != 0) return damaged;
   engine.poses = new WebPose[modar_pattern_count(engine.bundle) + kMostOwn]();
   const uint32_t items =
       modar_scene_count(engine.bundle) + modar_node_count(engine.bundle) + kMostOwn;
@@ -428,22 +496,6 @@ EMSCRIPTEN_KEEPALIVE double web_brightness(const uint8_t* gray, size_t stride) {
   return count == 0 ? 0 : sum / count;
 }
 
-/// Uploads the models into the current context, in place of what was there. lost: 1 where that
-/// context is new after a loss. fixed: 1 where light does not follow web_look().
-EMSCRIPTEN_KEEPALIVE int web_upload(int lost, int fixed) {
-  if (lost != 0 && engine.renderer != nullptr)
-    return modar_renderer_restore(engine.renderer, &engine.error);
-  modar_renderer_destroy(engine.renderer);
-  engine.renderer = modar_renderer_create(engine.bundle, nullptr, 0, &engine.error);
-  if (engine.renderer == nullptr) return engine.error.status;
-  auto options = modar::sized<modar_render_options>();
-  modar_render_options_default(&options);
-  options.exclusive = 1;
-  options.fixed_light = fixed;
-  modar_renderer_set_options(engine.renderer, &options);
-  return 0;
-}
-
 /// Draws the models of the poses in web_poses() into the canvas, transparent elsewhere, for a frame
 /// of web_camera() that covers the canvas. turn: radians, and size: a factor, of all models.
 EMSCRIPTEN_KEEPALIVE void web_draw(int width, int height, int mirror, float turn, float size) {
@@ -570,8 +622,10 @@ EMSCRIPTEN_KEEPALIVE const uint32_t* web_pick(int width, int height, int mirror,
   const modar_surface surface = surface_of(width, height, mirror);
   modar_surface_to_frame(&surface, &engine.camera, x, y, &x, &y);
   auto hit = modar::sized<modar_hit>();
-  if (modar_pick(engine.bundle, &engine.camera, x, y, engine.items, engine.item_count, &hit) == 0)
-    return nullptr;
+  const int met = with_triangles([&] {
+    return modar_pick(engine.bundle, &engine.camera, x, y, engine.items, engine.item_count, &hit);
+  });
+  if (met == 0) return nullptr;
   if (engine.items[hit.item].node == 0) return nullptr;
   found[0] = engine.items[hit.item].node - 1;
   found[1] = hit.material;
@@ -586,11 +640,12 @@ EMSCRIPTEN_KEEPALIVE const float* web_label(uint32_t node, int width, int height
   const WebPose& pose = engine.poses[web_node(node, 0)];
   auto label = modar::sized<modar_label>();
   const modar_item* items = look != 0 ? engine.items : nullptr;
-  if (pose.shown == 0.0f ||
-      modar_label_project(engine.actions, node, &engine.camera, pose.view, items,
-                          look != 0 ? engine.item_count : 0, &label) == 0) {
-    return nullptr;
-  }
+  if (pose.shown == 0.0f) return nullptr;
+  const int seen = with_triangles([&] {
+    return modar_label_project(engine.actions, node, &engine.camera, pose.view, items,
+                               look != 0 ? engine.item_count : 0, &label);
+  });
+  if (seen == 0) return nullptr;
   // The frame covers the canvas, its middle in the middle; pixels' centres are whole numbers.
   const double scale = std::fmax(static_cast<double>(width) / engine.camera.width,
                                  static_cast<double>(height) / engine.camera.height);

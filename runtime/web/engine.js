@@ -86,30 +86,42 @@ export class Engine {
     });
   }
 
-  /** Copies the bundle in and verifies it. @param {Uint8Array} bytes */
-  open(bytes) {
-    this.#bundle = { at: this.#reserve(bytes.length), size: bytes.length };
-    this.put(0, bytes);
-    this.#open(true);
-  }
-
-  /** Makes room for a bundle of that many bytes, opens it with what is put there first, and takes the rest by put(). */
+  /**
+   * Makes room for a bundle of that many bytes, where pages that nothing is put into take no memory, and opens it with what is put there
+   * first. What is shown as the coarsest comes by put(), the rest by pass().
+   */
   arrive(size, pieces) {
     this.#bundle = { at: this.#module._web_arrive(size) || this.#missing(size), size };
     for (const { offset, bytes } of pieces) this.put(offset, bytes);
-    this.#open(false);
+    this.#open();
   }
 
   put(offset, bytes) {
     this.#module.HEAPU8.set(bytes, this.#bundle.at + offset);
   }
 
-  /** What upload() uploads from now on of a bundle that arrives: the coarsest of everything, or all of it, which is verified. */
-  show(all) {
-    this.#check(this.#module._web_show(all ? 1 : 0));
+  /** Before pass(), in the context that is current. inOrder: bytes come as in a file; else what showCoarse() shows is there. */
+  beginRest(inOrder) {
+    this.#check(this.#module._web_begin_rest(inOrder ? 1 : 0));
   }
 
-  /** The bundle, a view until the heap grows. */
+  /** Takes bytes that are drawn from to the GPU, and keeps what the engine itself reads. */
+  pass(offset, bytes) {
+    this.frameBuffer(bytes.length).set(bytes);
+    this.#check(this.#module._web_pass(offset, this.frameAt, bytes.length));
+  }
+
+  /** Draws the coarsest of everything from now on. fixedLight: the models' light does not follow look(). */
+  showCoarse(fixedLight) {
+    this.#check(this.#module._web_show_coarse(fixedLight ? 1 : 0));
+  }
+
+  /** Draws what pass() took from now on, which is verified. */
+  showAll(fixedLight) {
+    this.#check(this.#module._web_show_all(fixedLight ? 1 : 0));
+  }
+
+  /** The bundle, a view until the heap grows: what pass() took is missing in part. */
   get bytes() {
     return this.#module.HEAPU8.subarray(this.#bundle.at, this.#bundle.at + this.#bundle.size);
   }
@@ -135,9 +147,9 @@ export class Engine {
     return this.#module.HEAPU8.slice(at, at + size);
   }
 
-  #open(whole) {
+  #open() {
     const m = this.#module;
-    this.#check(m._web_open(this.#bundle.at, this.#bundle.size, whole ? 1 : 0));
+    this.#check(m._web_open());
     this.patterns = Array.from({ length: m._web_pattern_count() }, (_, i) => ({
       name: m.UTF8ToString(m._web_pattern_name(i)), widthMm: m._web_pattern_width_mm(i),
     }));
@@ -335,11 +347,6 @@ export class Engine {
   useContext(context, version) {
     const { GL } = this.#module;
     GL.makeContextCurrent(GL.registerContext(context, { majorVersion: version, enableExtensionsByDefault: true }));
-  }
-
-  /** fixedLight: the models' light does not follow look(). */
-  upload(afterLoss, fixedLight = false) {
-    this.#check(this.#module._web_upload(afterLoss ? 1 : 0, fixedLight ? 1 : 0));
   }
 
   /** The light in a small copy of the poses' frame. @param {ImageData} image */

@@ -28,7 +28,8 @@ export interface SceneNode {
  */
 export class View extends EventTarget {
   /**
-   * bundle: its bytes, or what load() answers, which also takes packed bundles; both may still be on their way. picture, models: laid over each other by the page, of one size.
+   * bundle: bytes of a raw one, or what load() answers, which also takes packed bundles; both may still be on their way. What is drawn
+   * from goes to the GPU and is not kept: after a lost context it is asked for again, where load() was given an address. picture, models: laid over each other by the page, of one size.
    * fixedLight: the models' light does not follow the camera's picture. webgl1: for tests. Errors: ModarError.
    */
   static create(bundle: Modar | Uint8Array | Promise<Modar | Uint8Array>, options: {

@@ -1,6 +1,6 @@
 // Draws what modar.js sees: the frame in one canvas, the bundle's models over it in another. Both change in the same
 // task, so picture and models never part.
-import { STAGE } from './arrival.js';
+import { RawArrival, Source, STAGE } from './arrival.js';
 import { Engine, hasSimd, ModarError, POSE, POSE_FLOATS } from './engine.js';
 import { drawFrame, fitCanvases } from './modar.js';
 
@@ -48,8 +48,14 @@ export class View extends EventTarget {
   /** Of a packed bundle: all of it is there, and drawn. */
   whole = Promise.resolve();
   #complete = false;
-  /** More came while the context was lost. */
-  #stale = false;
+  /** What showCoarse() shows is there. */
+  #coarse = false;
+  /** Of contexts, and what waits for a new one. */
+  #losses = 0;
+  #restored = Promise.resolve();
+  #tellRestored = () => {};
+  /** What has brought all of it. */
+  #arrival = null;
   #fixedLight = false;
   #small = null;
   #framesSinceLook = LIGHT_EVERY;
@@ -77,52 +83,71 @@ export class View extends EventTarget {
     view.#engine = await openEngine(simd);
     view.#engine.useContext(view.#gl.context, view.#gl.version);
     const given = await bundle;
-    if (given.arrival) view.#engine.arrive(given.arrival.size, given.arrival.found.splice(0));
-    else view.#engine.open(given.bytes ?? given);
+    const arrival = given.arrival ?? new RawArrival(new Source(given));
+    if (!given.arrival) await arrival.begin(new Uint8Array());
+    view.#engine.arrive(arrival.size, arrival.found.splice(0));
     if (view.#plays) {
       const { Media } = await import('./media.js');
       view.#media = new Media(view.#engine, () => view.#soon(), (node, text, language) => view.#tell('caption', { node, text, language }));
     }
-    if (!given.arrival) view.#finish();
     models.addEventListener('webglcontextlost', (event) => {
       event.preventDefault();  // without this it is never restored
-      view.#lost = true;
+      view.#lose();
     });
     models.addEventListener('webglcontextrestored', () => view.#restore(webgl1));
-    if (given.arrival) {
-      view.whole = view.#refine(given.arrival);
-      view.whole.catch(() => {});  // told to those who wait for it
-    }
+    view.whole = view.#refine(arrival);
+    view.whole.catch(() => {});  // told to those who wait for it
+    if (arrival.inOrder) await view.whole;
     return view;
   }
 
   /** First the coarsest of everything, then all. */
   async #refine(arrival) {
-    const put = (offset, bytes) => this.#engine.put(offset, bytes);
-    for (const stage of [STAGE.show, STAGE.refine]) {
-      await arrival.bring(stage, put);
-      this.#engine.show(stage === STAGE.refine);
-      if (stage === STAGE.refine) this.#finish();
-      else {
-        this.#upload();
-        performance.mark('modar: coarse');
-      }
-      this.dispatchEvent(new Event('refined'));
-      this.#soon();
+    if (!arrival.inOrder) {
+      await arrival.bring(STAGE.show, (offset, bytes) => this.#engine.put(offset, bytes));
+      this.#showCoarse();
+      performance.mark('modar: coarse');
+      this.#tellRefined();
     }
+    await this.#bringRest(arrival);
   }
 
-  #upload() {
+  #showCoarse() {
+    this.#coarse = true;
+    if (!this.#lost) this.#engine.showCoarse(this.#fixedLight);  // else #restore() will
+    this.#empty = this.#lost;
+  }
+
+  /** What is drawn from goes to the GPU, as often as that forgets it meanwhile. */
+  async #bringRest(arrival) {
+    for (;;) {
+      await this.#restored;
+      const run = this.#losses;
+      try {
+        this.#engine.beginRest(arrival.inOrder);
+      } catch (error) {
+        if (!this.#gl.context.isContextLost()) throw error;
+        this.#lose();
+        continue;
+      }
+      await arrival.bring(STAGE.refine, (offset, bytes) => this.#engine.pass(offset, bytes));
+      if (run === this.#losses) break;
+      arrival = await arrival.again();
+    }
+    this.#arrival = arrival;
+    this.#engine.showAll(this.#fixedLight);
     this.#empty = false;
-    this.#stale = this.#lost;
-    if (!this.#lost) this.#engine.upload(false, this.#fixedLight);  // else #restore() will
-  }
-
-  #finish() {
-    this.#upload();
-    this.#media.prepare();
+    this.#coarse = true;  // it is there
+    this.#media.forget();
+    if (!this.#complete) this.#media.prepare();
     this.#complete = true;
     performance.mark('modar: whole');
+    this.#tellRefined();
+  }
+
+  #tellRefined() {
+    this.dispatchEvent(new Event('refined'));
+    this.#soon();
   }
 
   /** The bundle has videos or sounds. */
@@ -280,13 +305,25 @@ export class View extends EventTarget {
     const { context, version } = this.#gl;
     try {
       this.#engine.useContext(context, version);
-      if (!this.#empty) this.#engine.upload(!this.#stale, this.#fixedLight);
+      if (this.#coarse) this.#engine.showCoarse(this.#fixedLight);
     } catch (error) {
       if (context.isContextLost()) return;  // again: the next one will do
       throw error;
     }
-    this.#lost = this.#stale = false;
+    this.#lost = false;
+    this.#empty = !this.#coarse;
     this.#media.forget();
+    this.#tellRestored();
+    if (!this.#arrival) return;  // #bringRest() sees it
+    const arrival = this.#arrival;
+    this.#arrival = null;
+    arrival.again().then((again) => this.#bringRest(again)).catch((error) => this.#tell('error', error));
+  }
+
+  #lose() {
+    if (!this.#lost) this.#restored = new Promise((resolve) => { this.#tellRestored = resolve; });
+    this.#lost = true;
+    ++this.#losses;
   }
 
   /** The picture alone, of a frame that nothing is known of. */

@@ -284,7 +284,6 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     }
     this.#modar = opened;
     if (!this.#patternsGiven) this.#usePatterns(describe(() => view.bytes, opened.patterns));
-    opened.bytes = null;  // the engines have their own copies
     this.#listenToScenes(view);
     this.#followRest(view);
     opened.addEventListener('frame', ({ detail }) => this.#onFrame(detail));

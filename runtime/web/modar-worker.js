@@ -82,10 +82,9 @@ const answers = {
     engine = await loading;
     return { type: 'prepared' };
   },
-  /** A bundle, or as much of one as finds its patterns: arrival.js. */
-  open({ bytes, size, found }) {
-    if (bytes) engine.open(new Uint8Array(bytes));
-    else engine.arrive(size, found);
+  /** As much of a bundle as finds its patterns: arrival.js. */
+  open({ size, found }) {
+    engine.arrive(size, found);
     return { type: 'opened', patterns: engine.patterns, scenes: engine.scenes, kind: engine.kind };
   },
   async recipe({ bytes }) {

@@ -93,8 +93,6 @@ export interface ModarEvents {
 export class Modar extends EventTarget {
   readonly patterns: Pattern[];
   readonly scenes: Scene[];
-  /** Of a raw bundle; empty for a packed one, of which View.create() takes the Modar. */
-  readonly bytes: Uint8Array;
   /** Which build of the engine runs. */
   readonly kind: 'simd' | 'plain';
   /**
@@ -144,8 +142,8 @@ export class Modar extends EventTarget {
 }
 
 /**
- * Opens a bundle, raw (.modar) or packed (.packed, of `modar web`): its address, or its bytes. Of a packed one as much is brought as finds
- * its patterns; View.create() brings the rest. A download that breaks off goes on where it did, and damaged pieces are brought again.
+ * Opens a bundle, raw (.modar) or packed (.packed, of `modar web`): its address, or its bytes. As much is brought as finds its patterns;
+ * View.create() brings the rest, once. A download that breaks off goes on where it did, and damaged pieces are brought again.
  * Errors: ModarError.
  */
 export function load(bundle: string | URL | ArrayBuffer | Uint8Array, options?: {

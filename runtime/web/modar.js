@@ -6,7 +6,7 @@
 //   await modar.start(video);
 //
 // Types and words: modar.d.ts. The drawing of a bundle's own models is in modar-view.js.
-import { Arrival, isPacked, Source } from './arrival.js';
+import { Arrival, isPacked, RawArrival, Source } from './arrival.js';
 import { hasSimd, ModarError, POSE, POSE_FLOATS, shrinkOf, strandedFile } from './engine.js';
 import { allowMotion, Gyroscope } from './gyroscope.js';
 
@@ -204,9 +204,7 @@ export class Modar extends EventTarget {
   #gyroscope = null;
   /** When the last frame was taken that was tracked; undefined: unknown. */
   #trackedAt;
-  /** @see modar.d.ts */
-  bytes = new Uint8Array();
-  /** Of a packed bundle: what brings it. */
+  /** What brings the bundle. */
   arrival = null;
 
   /** @see load */
@@ -221,19 +219,12 @@ export class Modar extends EventTarget {
     source.onProgress = onProgress;
     try {
       const start = await source.take(8, false);
-      let opening;
-      if (isPacked(start)) {
-        modar.arrival = new Arrival(source, new Calls(openWorker(modar.#simd)));
-        await modar.arrival.begin(start);
-        opening = [{ size: modar.arrival.size, found: modar.arrival.found }];
-      } else {
-        modar.bytes = await source.take(Infinity, false, null, [start]);
-        const copy = modar.bytes.slice().buffer;
-        opening = [{ bytes: copy }, [copy]];
-        source.close();
-      }
+      modar.arrival = isPacked(start) ? new Arrival(source, () => new Calls(openWorker(modar.#simd))) : new RawArrival(source);
+      await modar.arrival.begin(start);
       await prepared;
-      const { patterns, scenes, kind } = await modar.#tracker.ask({ type: 'open', ...opening[0] }, opening[1]);
+      const { size, found, tracked = found } = modar.arrival;
+      const { patterns, scenes, kind } = await modar.#tracker.ask({ type: 'open', size, found: tracked });
+      modar.arrival.tracked = null;
       Object.assign(modar, { patterns, scenes, kind });
     } catch (error) {
       source.close();

@@ -46,6 +46,15 @@ void read_packed(std::span<const std::byte> bytes) {
   }
   if (const auto shown = bundle->show_coarsest(); !shown) test::need_told(shown.error());
   bundle->show_all();
+  const auto kept = bundle->keep(true);
+  if (!kept) return test::need_told(kept.error());
+  for (const StageRange& range : bundle->kept()) {
+    need(range.offset <= bundle->bytes().size());
+    need(range.size <= bundle->bytes().size() - range.offset);
+  }
+  const std::vector<std::byte> all(bundle->bytes().begin(), bundle->bytes().end());
+  if (const auto passed = bundle->pass(0, all); !passed) test::need_told(passed.error());
+  if (const auto verified = bundle->verify(); !verified) test::need_told(verified.error());
 }
 
 /// The hash of a recipe hides what lies behind it: made true first.

@@ -295,6 +295,62 @@ TEST(Arriving, WhatIsShownFirstIsThere) {
   EXPECT_EQ(copy(*some), before);
 }
 
+/// A raw bundle that comes in its own order, as far as `end`, in pieces; its error, if any.
+Result<void> pass_all(ArrivingBundle& bundle, std::span<const std::byte> bytes, std::uint64_t end) {
+  const std::uint64_t start = gpu_start(BundleView::open(bundle.bytes()).value());
+  MODAR_TRY(bundle.keep(true));
+  for (std::uint64_t at = start; at < end; at += 1001) {
+    MODAR_TRY(bundle.pass(at, bytes.subspan(at, std::min<std::uint64_t>(1001, end - at))));
+  }
+  return bundle.verify();
+}
+
+TEST(Arriving, OfWhatPassesByIsKeptWhatIsRead) {
+  Bytes bytes = staged_bundle();
+  const auto whole = BundleView::open(bytes).value();
+  const std::uint64_t start = gpu_start(whole);
+  const auto begin = [&] {
+    auto bundle = ArrivingBundle::create(bytes.size());
+    bundle->put(0, std::span(bytes).first(start));
+    return bundle;
+  };
+  const auto bundle = begin();
+  const auto passed = pass_all(*bundle, bytes, bytes.size());
+  ASSERT_TRUE(passed) << passed.error().cause;
+  for (const StageRange& range : bundle->kept()) {
+    EXPECT_TRUE(std::equal(bytes.begin() + static_cast<std::ptrdiff_t>(range.offset),
+                           bytes.begin() + static_cast<std::ptrdiff_t>(range.offset + range.size),
+                           bundle->bytes().begin() + static_cast<std::ptrdiff_t>(range.offset)));
+  }
+  EXPECT_GT(bundle->kept().size(), 1u) << "stand-ins and small levels of textures";
+  EXPECT_NE(copy(*bundle), bytes);
+  // Whoever reads triangles finds those of stand-ins, and only meanwhile.
+  const auto first_chunk = [&] {
+    return BundleView::open(bundle->bytes()).value().models()[0].first_chunk;
+  };
+  const std::uint32_t before = first_chunk();
+  const std::byte* const models =
+      bundle->bytes().data() + (whole.section(SectionType::kModels).data() - bytes.data());
+  const auto record = [&] {
+    ModelRecord model{};
+    std::memcpy(&model, models + sizeof(TableHeader), sizeof model);
+    return model;
+  };
+  EXPECT_EQ(record().first_chunk, before);
+  const std::uint32_t meanwhile = bundle->with_stand_ins([&] { return record().first_chunk; });
+  EXPECT_GE(meanwhile, whole.chunks().own().size());
+  EXPECT_EQ(record().first_chunk, before);
+  // Bytes that are wrong or missing.
+  EXPECT_EQ(pass_all(*begin(), bytes, bytes.size() - 1).error().code, "section.hash");
+  bytes[start + 5] ^= std::byte{1};
+  EXPECT_EQ(pass_all(*begin(), bytes, bytes.size()).error().code, "section.hash");
+  bytes[start + 5] ^= std::byte{1};
+  const auto damaged = begin();
+  const auto record_of = whole.section(SectionType::kTrackerRecord, 0);
+  damaged->bytes()[static_cast<std::size_t>(record_of.data() - bytes.data()) + 300] ^= std::byte{1};
+  EXPECT_FALSE(pass_all(*damaged, bytes, bytes.size()));
+}
+
 TEST(Arriving, OtherFilesAndOrdersAreRefused) {
   const Bytes bytes = staged_bundle();
   const Bytes packed = pack_bundle(BundleView::open(bytes).value());

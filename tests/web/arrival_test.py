@@ -40,16 +40,26 @@ DRAW = """(async () => {
     const coarse = new Promise((resolve) => view.addEventListener('refined', () => resolve(hash(view)), { once: true }));
     view.addEventListener('refined', () => { drawn.refined = (drawn.refined ?? 0) + 1; });
     drawn.first = await hash(view);
-    drawn.lost = %s && await new Promise((resolve) => {
-      const { models } = { models: document.querySelectorAll('canvas')[1] };
+    const lose = () => new Promise((resolve) => {
+      const models = document.querySelectorAll('canvas')[1];
       const context = models.getContext('webgl2').getExtension('WEBGL_lose_context');
       models.addEventListener('webglcontextrestored', () => resolve(true));
       models.addEventListener('webglcontextlost', () => setTimeout(() => context.restoreContext(), 50));
       context.loseContext();
     });
-    if (modar.arrival) drawn.coarse = await coarse;
+    const when = %s;
+    drawn.lost = when === true && await lose();
+    if (!modar.arrival.inOrder) drawn.coarse = await coarse;
     await view.whole;
     drawn.whole = await hash(view);
+    drawn.kept = view.bytes.reduce((count, byte) => count + (byte !== 0), 0);
+    if (when === 'after') {
+      const refined = new Promise((resolve) => view.addEventListener('refined', resolve, { once: true }));
+      await lose();
+      drawn.meanwhile = await hash(view);
+      await refined;
+      drawn.again = await hash(view);
+    }
   } catch (error) {
     drawn.error = error.code ?? String(error);
   }
@@ -167,7 +177,7 @@ class Arrival(ProgramTest):
         print(f"raw {self.raw} bytes, packed {len(self.http.packed)}, the patterns {sum(size for _, size, stage in self.pieces if stage == 1)}")
         self.assertEqual({**drawn, "coarse": 0, "first": 0},
                          {"coarse": 0, "first": 0, "refined": 2, "whole": self.wanted["whole"], "patterns": ["cover"], "lost": False,
-                          "progress": [len(self.http.packed)] * 2})
+                          "kept": self.wanted["kept"], "progress": [len(self.http.packed)] * 2})
         # First nothing, then something that is not all.
         self.assertEqual(len({drawn["first"], drawn["coarse"], drawn["whole"]}), 3)
         self.assertEqual(self.http.asked["right"], [None])
@@ -218,6 +228,33 @@ class Arrival(ProgramTest):
             drawn = self.draw(bytes_of, lose)
             self.assertEqual((drawn.get("whole"), drawn["lost"]), (self.wanted["whole"], lose), drawn)
         self.assertIn(self.draw(f"new Uint8Array({bytes_of}).fill(7, 99999, 100200)").get("error", "").split(".")[0], ("piece", "record"))
+
+    def test_what_the_gpu_draws_from_is_not_kept_and_asked_for_again_after_a_loss(self):
+        bundle = (self.base / "site" / "bundles" / "demo.modar").read_bytes()
+        count, entries = int.from_bytes(bundle[12:16], "little"), []
+        for at in range(64, 64 + 48 * count, 48):
+            entries.append((int.from_bytes(bundle[at:at + 4], "little"), *(int.from_bytes(bundle[i:i + 8], "little") for i in (at + 16, at + 24))))
+        head = min(offset for kind, offset, _ in entries if kind >= 512)
+        drawn_from = len(bundle) - head - bundle[head:].count(0)
+        kept = self.wanted["kept"] - (head - bundle[:head].count(0))
+        print(f"of {drawn_from} bytes that are drawn from, {kept} are kept in the page's memory")
+        self.assertLess(kept, 0.6 * drawn_from)
+        first = next(at for at, _, stage in self.pieces if stage == 3)
+        for name, begins in (("after/demo.packed", first), ("bundles/demo.modar", head)):
+            with self.subTest(name):
+                drawn = self.draw(f"'/{name}'", lose="after")
+                self.assertEqual((drawn.get("whole"), drawn.get("again"), drawn.get("error")), (self.wanted["whole"], self.wanted["whole"], None))
+                self.assertNotIn(drawn["meanwhile"], (drawn["first"], drawn["whole"]) if "packed" in name else (None,), "the coarsest")
+                if "packed" in name:
+                    self.assertEqual(self.http.asked["after"], [None, f"bytes={begins}-"])
+
+    def test_damaged_raw_bundles_are_refused(self):
+        bytes_of = "new Uint8Array(await (await fetch('/bundles/demo.modar')).arrayBuffer())"
+        for change, code in (("fill(7, -900, -890)", "section.hash"), ("fill(7, 60, 90)", "bundle."), ("slice(0, -4096)", "web.download"), ("slice(0, 30)", "bundle.")):
+            with self.subTest(change):
+                drawn = self.draw(f"{bytes_of}.{change}")
+                self.assertTrue(drawn.get("error", "").startswith(code), drawn)
+                self.assertNotIn("whole", drawn)
 
     def test_damaged_downloads_are_mended(self):
         for kind in ("flipped", "recipe", "swapped", "torn", "short", "rangeless", "closing"):

@@ -1151,7 +1151,7 @@ COMPARE = """(async () => {
   };
   const picture = async (address) => createImageBitmap(await (await fetch(address)).blob());
   const models = canvas();
-  const view = await View.create(modar.bytes, { picture: canvas(), models, webgl1: %s, fixedLight: true });
+  const view = await View.create(modar, { picture: canvas(), models, webgl1: %s, fixedLight: true });
   const frames = [];
   for (let i = 0; i < %d; ++i) {
     const number = String(i).padStart(5, '0');

@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "formats/base/error.hpp"
+#include "formats/bundle_view.hpp"
 #include "formats/transport/recipe.hpp"
+#include "formats/transport/stages.hpp"
 #include "modar/packed_record.hpp"
 
 namespace modar {
@@ -41,19 +43,55 @@ class ArrivingBundle {
   [[nodiscard]] std::span<std::byte> bytes() { return {bytes_.get(), size_}; }
   /// Puts raw bytes in their place; false where they leave the bundle.
   bool put(std::uint64_t offset, std::span<const std::byte> raw);
-  /// Copies the tables, then shows the coarsest of everything: see show_coarsest(). Errors: as of
-  /// BundleView::open().
+  /// Of the last stage, whose vertices, indices and texture blocks go to the GPU: puts what
+  /// kept_ranges() names in its place, and looks at section hashes if bytes come in the file's
+  /// order (from gpu_start() on). Errors: kInvalidInput "section.hash".
+  Result<void> pass(std::uint64_t offset, std::span<const std::byte> raw);
+  /// What of the bundle stays in this memory. Empty before keep().
+  [[nodiscard]] std::span<const StageRange> kept() const { return kept_; }
+  /// Begins the last stage: for pass(). in_order: the bytes are a file's, no pieces that were
+  /// verified. Errors: as of BundleView::open().
+  Result<void> keep(bool in_order);
+  /// Whether every section that stays whole has the hash that the table states, and all bytes of
+  /// the others were looked at where keep() was told to. Errors: kInvalidInput
+  /// "section.hash".
+  [[nodiscard]] Result<void> verify() const;
+  /// For what reads triangles of kept_ranges() alone: calls `read` while models have the chunks of
+  /// their coarsest stand-ins.
+  template <class Read>
+  auto with_stand_ins(const Read& read) {
+    const auto models = view_.section(SectionType::kModels);
+    const std::vector<std::byte> before(models.begin(), models.end());
+    use_stand_ins(bytes(), view_);
+    auto answer = read();
+    if (!models.empty()) put(static_cast<std::uint64_t>(models.data() - bytes_.get()), before);
+    return answer;
+  }
+  /// Shows the coarsest of everything, in tables that take the place of the bundle's own: see
+  /// show_coarsest(). Errors: as of BundleView::open().
   Result<void> show_coarsest();
-  /// Puts the tables back.
+  /// Puts the bundle's own tables back.
   void show_all();
+  [[nodiscard]] bool shows_all() const { return !coarse_; }
 
  private:
+  struct Hash;
+  struct FreeHash {
+    void operator()(Hash* hash) const;
+  };
+  Result<void> look_at(std::uint64_t offset, std::span<const std::byte> raw);
+
   struct Free {
     void operator()(std::byte* bytes) const { std::free(bytes); }
   };
   std::unique_ptr<std::byte, Free> bytes_;
   std::size_t size_ = 0;
-  std::vector<std::byte> tables_;  ///< while other ones are shown
+  std::vector<std::byte> tables_;  ///< those that are not shown
+  bool coarse_ = false;
+  BundleView view_;  ///< of keep()
+  std::vector<StageRange> kept_;
+  std::unique_ptr<Hash, FreeHash> hash_;  ///< of the section `looked_at_`; null: not wanted
+  std::size_t looked_at_ = 0;
 };
 
 }  // namespace modar

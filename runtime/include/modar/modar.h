@@ -335,6 +335,14 @@ typedef struct modar_render_stats {
  * gpu_bytes: limit of GL memory for models and textures; 0: that of the profile, or none. */
 modar_renderer* modar_renderer_create(const modar_bundle* bundle, const char* device,
                                       uint64_t gpu_bytes, modar_error* error);
+/* Of a bundle whose bytes are still coming, as Renderer::create_part() of modar/renderer.hpp.
+ * comes: 0: only the coarsest is there; 1: modar_renderer_put() brings what
+ * GPUs draw from. */
+MODAR_EXPERIMENTAL modar_renderer* modar_renderer_create_part(const modar_bundle* bundle, int comes,
+                                                              modar_error* error);
+/* Bytes of the bundle from `offset` on, which are uploaded and not kept. */
+MODAR_EXPERIMENTAL void modar_renderer_put(modar_renderer* renderer, uint64_t offset,
+                                           const void* bytes, size_t size);
 void modar_renderer_destroy(modar_renderer* renderer);
 /* After a lost context, with the new one current: uploads everything again from the bundle's bytes.
  */

@@ -208,6 +208,15 @@ class Renderer {
   /// least recently visible. The bundle's bytes must outlive the renderer. Errors:
   /// kUnsupported "gl.*".
   static Result<std::unique_ptr<Renderer>> create(const BundleView& bundle, const GlCaps& caps);
+  /// A renderer of a bundle of which not all bytes are there. comes = false: only the coarsest is,
+  /// and the bundle's tables say so (show_coarsest() of formats/transport/stages.hpp): what is
+  /// drawn is uploaded then. comes = true: put() brings vertices, indices and texture blocks, which
+  /// are not read from the bundle's bytes, except what kept_ranges() names there. To be drawn with
+  /// when all of them have come; nothing checks that indices are below their level's vertex count,
+  /// which contexts that bound what a draw call reads (WebGL) need not have. Errors: as create(),
+  /// and kUnsupported "gl.halves" where vertices that come would have to be rewritten.
+  static Result<std::unique_ptr<Renderer>> create_part(const BundleView& bundle, const GlCaps& caps,
+                                                       bool comes);
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
   ~Renderer();
@@ -246,6 +255,10 @@ class Renderer {
   /// bytes, at the same size and with the same options. Does not touch objects of the lost
   /// context. Errors: as create() and resize().
   Result<void> restore(const GlCaps& caps);
+
+  /// Of create_part(): bytes of the bundle from `offset` on, which are uploaded and not kept.
+  /// Each byte once; those of a texture in their order.
+  void put(std::uint64_t offset, std::span<const std::byte> bytes);
 
   /// Copies the picture, top row first, 4 bytes a pixel (RGBA). rgba.size() == width * height * 4.
   void read_pixels(std::span<std::uint8_t> rgba);

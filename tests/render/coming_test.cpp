@@ -1,0 +1,154 @@
+// A bundle whose vertices, indices and blocks pass by on their way to the GPU: drawn as one in
+// memory.
+#include <cstring>
+
+#include <gtest/gtest.h>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "formats/transport/stages.hpp"
+#include "tests/render/scene.hpp"
+
+namespace modar {
+namespace {
+
+/// A bundle's bytes, aligned, and a view of them.
+struct Memory {
+  explicit Memory(std::span<const std::byte> from)
+      : words((from.size() + 7) / 8), size(from.size()) {
+    std::memcpy(words.data(), from.data(), from.size());
+    view = BundleView::open(bytes()).value();
+  }
+  [[nodiscard]] std::span<std::byte> bytes() {
+    return std::as_writable_bytes(std::span(words)).first(size);
+  }
+  std::vector<std::uint64_t> words;
+  std::size_t size;
+  BundleView view;
+};
+
+std::vector<std::byte> blocks_of(std::uint32_t side, unsigned seed) {
+  const std::size_t across = (side + 3) / 4;
+  std::vector<std::byte> blocks(8 * across * across);
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    // Bases of 4 bits and any modifiers: every such block has a meaning.
+    blocks[i] = i % 8 == 3 ? std::byte{0x24} : static_cast<std::byte>(37 * i + 101 * seed);
+  }
+  return blocks;
+}
+
+/// Two chunks with a stand-in of one, and a textured square of levels with alpha.
+BundleContent two_kinds() {
+  SceneMaker maker;
+  std::vector<std::vector<std::byte>> colour;
+  std::vector<std::vector<std::byte>> alpha;
+  for (std::uint32_t side = 16, seed = 1; side > 0; side /= 2, ++seed) {
+    colour.push_back(blocks_of(side, seed));
+    alpha.push_back(blocks_of(side, seed + 9));
+  }
+  const std::uint32_t texture = maker.add_texture(16, colour, alpha, kTextureAlpha);
+  MaterialRecord seen = flat_material();
+  seen.texture = texture;
+  const std::uint32_t material = maker.add_material(seen);
+  const std::uint32_t layout = maker.add_layout(Layout::kHalfTextured);
+  Triangle lower;
+  lower.corners = {glm::dvec3(-1, -1, 0), {1, -1, 0}, {1, 1, 0}};
+  lower.uvs = {glm::dvec2(0, 1), {1, 1}, {1, 0}};
+  maker.add_model(layout, {{{{lower}}, {0.0f}, material, {}}});
+  const auto strip = [](double left, double right, const Rgb& tint) {
+    const glm::dvec3 a(left, -0.5, 0), b(right, -0.5, 0), c(right, 0.5, 0), d(left, 0.5, 0);
+    return std::vector<Triangle>{{{a, b, c}, {}, tint}, {{a, c, d}, {}, tint}};
+  };
+  const std::uint32_t plain = maker.add_material(flat_material());
+  const std::uint32_t coloured = maker.add_layout(Layout::kHalfColoured);
+  maker.add_model(coloured, {{{strip(-0.5, 0, {255, 0, 0})}, {0.0f}, plain, {}},
+                             {{strip(0, 0.5, {0, 255, 0})}, {0.0f}, plain, {}}});
+  maker.add_model(coloured, {{{strip(-0.5, 0.5, {0, 0, 255})}, {0.0f}, plain, {}}});
+  BundleContent& content = maker.content;
+  const ModelRecord last = content.models.back();
+  content.models.pop_back();
+  content.stand_ins.push_back({1, 0, 1, 0});
+  content.stand_in_chunks.push_back(content.chunks.back());
+  content.stand_in_levels.push_back(content.levels.back());
+  content.stand_in_chunks[0].first_level = 0;
+  content.stand_in_levels[0].error = 0.1f;
+  content.chunks.resize(last.first_chunk);
+  content.levels.pop_back();
+  return content;
+}
+
+class ComingTest : public GlTest {
+ protected:
+  static std::vector<std::uint8_t> picture(Renderer& renderer) {
+    renderer.set_options(flat_light());
+    std::vector<DrawItem> items;
+    for (std::uint32_t model : {0u, 1u}) {
+      items.push_back(
+          {model, glm::translate(glm::mat4(1.0f), {0.2f, 0.1f * static_cast<float>(model),
+                                                   -2.0f - static_cast<float>(model)})});
+    }
+    return draw(renderer, default_camera(96, 72), items);
+  }
+};
+
+TEST_F(ComingTest, IsDrawnAsIfItWereInMemory) {
+  const MappedBundle bundle(two_kinds());
+  ASSERT_TRUE(bundle.view);
+  const auto whole = bundle.file.bytes();
+  const std::unique_ptr<Renderer> usual = make_renderer(*bundle.view, probe_gl_caps());
+  ASSERT_TRUE(usual);
+  const std::vector<std::uint8_t> wanted = picture(*usual);
+
+  Memory memory(whole);
+  const auto bytes = memory.bytes();
+  const std::uint64_t start = gpu_start(memory.view);
+  std::fill(bytes.begin() + static_cast<std::ptrdiff_t>(start), bytes.end(), std::byte{0});
+  for (const StageRange& range : kept_ranges(memory.view)) {
+    std::copy_n(whole.begin() + static_cast<std::ptrdiff_t>(range.offset), range.size,
+                bytes.begin() + static_cast<std::ptrdiff_t>(range.offset));
+  }
+  ASSERT_FALSE(std::equal(whole.begin(), whole.end(), bytes.begin())) << "something passes by";
+  // Pieces that end within a vertex, a block, a level; and all of it at once.
+  for (const std::size_t piece : {std::size_t{7}, std::size_t{101}, whole.size()}) {
+    auto renderer = Renderer::create_part(memory.view, probe_gl_caps(), true);
+    ASSERT_TRUE(renderer) << renderer.error().cause;
+    for (std::size_t at = static_cast<std::size_t>(start); at < whole.size(); at += piece) {
+      (*renderer)->put(at, whole.subspan(at, std::min(piece, whole.size() - at)));
+    }
+    EXPECT_TRUE(picture(**renderer) == wanted) << piece;
+  }
+  auto empty = Renderer::create_part(memory.view, probe_gl_caps(), true);
+  ASSERT_TRUE(empty);
+  EXPECT_FALSE(picture(**empty) == wanted);
+}
+
+TEST_F(ComingTest, VerticesThatWouldBeRewrittenAreRefused) {
+  const MappedBundle bundle(two_kinds());
+  GlCaps caps = probe_gl_caps();
+  caps.half_float_vertices = false;
+  const auto refused = Renderer::create_part(*bundle.view, caps, true);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, "gl.halves");
+}
+
+/// What only a stand-in is there of takes no more of the GPU than that.
+TEST_F(ComingTest, TheCoarsestIsUploadedWhenItIsDrawn) {
+  const MappedBundle bundle(two_kinds());
+  Memory memory(bundle.file.bytes());
+  show_coarsest(memory.bytes(), memory.view);
+  auto renderer = Renderer::create_part(memory.view, probe_gl_caps(), false);
+  ASSERT_TRUE(renderer) << renderer.error().cause;
+  EXPECT_EQ((*renderer)->gpu_memory().geometry, 0u);
+  const auto pixels = picture(**renderer);
+  EXPECT_GT((*renderer)->stats().triangles, 0u);
+  EXPECT_LT((*renderer)->gpu_memory().geometry,
+            bundle.view->vertices().size() + bundle.view->indices().size());
+  int blue = 0;
+  for (std::size_t i = 0; i < pixels.size(); i += 4) {
+    EXPECT_FALSE(pixels[i] == 255 && pixels[i + 1] == 0) << "a chunk of model 1";
+    blue += pixels[i + 2] == 255 && pixels[i] == 0 ? 1 : 0;
+  }
+  EXPECT_GT(blue, 0);
+}
+
+}  // namespace
+}  // namespace modar
