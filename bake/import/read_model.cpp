@@ -27,6 +27,23 @@ Format format_of(const std::string& extension) {
   return Format::kNone;
 }
 
+Result<SourceModel> read_format(const std::string& path, unsigned jobs) {
+  switch (format_of(extension_of(path))) {
+    case Format::kObj:
+      return read_obj(path, {jobs});
+    case Format::kGltf:
+      return read_gltf(path);
+    case Format::kPly:
+      return read_ply(path);
+    case Format::kStl:
+      return read_stl(path);
+    case Format::kNone:
+      break;
+  }
+  MODAR_TRY(require_model_format(path));
+  return fail(ExitCode::kInternal, "modar.bug", path, "a format without a reader", "report it");
+}
+
 }  // namespace
 
 bool is_model_file(const std::string& path) {
@@ -43,20 +60,13 @@ Result<void> require_model_format(const std::string& path) {
 }
 
 Result<SourceModel> read_model(const std::string& path, unsigned jobs) {
-  switch (format_of(extension_of(path))) {
-    case Format::kObj:
-      return read_obj(path, {jobs});
-    case Format::kGltf:
-      return read_gltf(path);
-    case Format::kPly:
-      return read_ply(path);
-    case Format::kStl:
-      return read_stl(path);
-    case Format::kNone:
-      break;
+  MODAR_ASSIGN(SourceModel model, read_format(path, jobs));
+  for (SourceMaterial& m : model.materials) {
+    // Clay is for what has no colour: those of vertices are seen as they are.
+    const bool clay = m.diffuse_map.empty() && m.diffuse == glm::vec3(kClay);
+    if (clay && !model.colours.empty()) m.diffuse = glm::vec3(1.0f);
   }
-  MODAR_TRY(require_model_format(path));
-  return fail(ExitCode::kInternal, "modar.bug", path, "a format without a reader", "report it");
+  return model;
 }
 
 }  // namespace modar

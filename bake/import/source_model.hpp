@@ -15,12 +15,16 @@
 
 namespace modar {
 
+/// Stored red, green and blue of what states no colour: in the renderer's own room, the part that
+/// faces the key light is just not clipped. No file states it to the last bit.
+inline constexpr float kClay = 229.0f / 255.0f;
+
 /// A material of an MTL or glTF file. Map paths are resolved against the file that names them and
 /// exist; empty where there is no map, or where it was not found (then there is a diagnostic).
 struct SourceMaterial {
   std::string name;
   glm::vec3 ambient{0.2f};
-  glm::vec3 diffuse{0.8f};
+  glm::vec3 diffuse{kClay};
   glm::vec3 specular{0.0f};
   glm::vec3 emission{0.0f};
   float shininess = 0.0f;

@@ -1,7 +1,9 @@
 // A room's picture as light, and a model's shadow, against sums over the sphere and simple shapes.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -11,7 +13,9 @@
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/bundle/light_image.hpp"
 #include "bake/bundle/scene/scene_shadow.hpp"
+#include "bake/import/source_model.hpp"
 #include "formats/base/atomic_file.hpp"
+#include "formats/base/colour.hpp"
 #include "modar/renderer.hpp"
 
 namespace {
@@ -136,6 +140,37 @@ BundleContent plate() {
   scene.rotation[3] = 1.0f;
   content->scenes.push_back(scene);
   return std::move(*content);
+}
+
+TEST(NeutralRoom, ShowsTheFormOfClay) {
+  // All directions that are seen from before, 20 degrees above: what modar-play's turntable shows.
+  const RoomLight room = neutral_room();
+  LightRecord record{};
+  for (int i = 0; i < 9; ++i) record.sky[3 * i] = room.sky[static_cast<std::size_t>(i)].g;
+  const glm::dvec3 to_key = glm::normalize(glm::dvec3(room.direction));
+  const auto stored = [&](const glm::dvec3& n, float colour) {
+    const double light =
+        sky_at(record, n) + static_cast<double>(room.key.g) * std::max(glm::dot(n, to_key), 0.0);
+    return 255 * srgb_of_linear(light * linear_of_srgb(static_cast<double>(colour)));
+  };
+  EXPECT_NEAR(stored({0, 0, 1}, 1.0f), 255, 2) << "white paper on a table is white";
+  EXPECT_GT(stored(to_key, kClay), 240);
+  EXPECT_LT(stored(to_key, kClay), 255) << "clipped";
+  std::vector<double> seen;
+  for (int i = 0; i < 4000; ++i) {
+    const double x = 2 * std::fmod(0.618033988749895 * i, 1.0) - 1;
+    const double y = (2 * i + 1) / 4000.0 - 1;
+    if (x * x + y * y >= 1) continue;
+    const double z = std::sqrt(1 - x * x - y * y);
+    const double tilt = 20 * M_PI / 180;
+    seen.push_back(stored(
+        {x, -z * std::cos(tilt) + y * std::sin(tilt), y * std::cos(tilt) + z * std::sin(tilt)},
+        kClay));
+  }
+  std::sort(seen.begin(), seen.end());
+  // three.js with a hemisphere and a key light shows busts between 72 and 255 (white).
+  EXPECT_LT(seen[seen.size() / 100], 110);
+  EXPECT_GT(seen[seen.size() * 99 / 100], 240);
 }
 
 TEST(SceneShadow, LiesUnderTheModelAwayFromTheLight) {

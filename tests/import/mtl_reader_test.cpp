@@ -109,6 +109,16 @@ TEST_F(MtlReader, ReflectionFollowsFromWhatTheMaterialStates) {
   EXPECT_EQ(m[4].reflectance, 0.0f) << "nothing of it would be seen";
 }
 
+TEST_F(MtlReader, APictureAloneIsSeenAsItIs) {
+  const auto m = parse(
+      "newmtl bare\nmap_Kd wood.jpg\nnewmtl tint\nKd 0.5\nmap_Kd wood.jpg\n"
+      "newmtl no");
+  ASSERT_EQ(m.size(), 3u);
+  EXPECT_EQ(m[0].diffuse, glm::vec3(1.0f));
+  EXPECT_EQ(m[1].diffuse, glm::vec3(0.5f));
+  EXPECT_EQ(m[2].diffuse, glm::vec3(kClay));
+}
+
 TEST_F(MtlReader, TheMeanOfATextureIsNotMultipliedByIt) {
   // Half of it (200, 100, 50), half (100, 0, 0): as SketchUp's exporter writes it.
   RgbaImage image{4, 4, {}};

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -89,6 +91,19 @@ TEST(Stl, SharpEdgesStaySharpAndRoundOnesAreSmooth) {
   EXPECT_NEAR(normal(*round, 0).x, 0, 1e-6);  // the ridge looks up
   EXPECT_NEAR(normal(*round, 0).z, 1, 1e-6);
   EXPECT_LT(normal(*round, 2).x, -0.2f);  // the eaves are the slope's
+}
+
+TEST(ReadModel, ColoursOfVerticesAreSeenAsTheyAre) {
+  const auto diffuse_of = [](const std::string& vertex_tail) {
+    const std::string path = ::testing::TempDir() + "modar_clay.obj";
+    std::ofstream(path) << "v 0 0 0" << vertex_tail << "\nv 1 0 0" << vertex_tail << "\nv 0 1 0"
+                        << vertex_tail << "\nf 1 2 3\n";
+    const auto model = read_model(path, 1);
+    std::filesystem::remove(path);
+    return model ? model->materials.at(0).diffuse : glm::vec3(-1.0f);
+  };
+  EXPECT_EQ(diffuse_of(" 0.2 0.4 0.6"), glm::vec3(1.0f));
+  EXPECT_EQ(diffuse_of(""), glm::vec3(kClay));
 }
 
 TEST(Stl, ColoursOfFacets) {

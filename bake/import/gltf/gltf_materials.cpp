@@ -393,7 +393,7 @@ std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const st
   MaterialReader reader(gltf, folder, label, diagnostics);
   std::vector<SourceMaterial> materials;
   for (const tinygltf::Material& m : gltf.materials) materials.push_back(reader.read(m));
-  materials.push_back(reader.read(tinygltf::Material()));
+  materials.emplace_back();
   reader.report();
   return materials;
 }

@@ -26,7 +26,7 @@ bool keep_image_bytes(tinygltf::Image* image, int index, std::string* error, std
 /// nearest to the extension: exporters leave the core's white.
 void use_metallic_roughness(tinygltf::Model& gltf);
 
-/// One material for each of the file's, followed by a white one for primitives without a material:
+/// One material for each of the file's, followed by clay for primitives without a material:
 /// emission, occlusion, roughness, metalness and the modes of alpha as far as our shader has them.
 /// Findings say what was folded into what, and what was left out.
 /// folder: where image names are looked up, with a trailing slash. label: the file's name in

@@ -280,12 +280,14 @@ void take_opacity(float opacity, MtlContext& context, SourceMaterial& material) 
 /// as much as Ks says where the illumination model has reflection (illum 3 and 5).
 struct MtlStatements {
   bool has_d = false;
+  bool has_kd = false;
   bool physical = false;
   float roughness = 1.0f;
   float metalness = 0.0f;
   float illum = 2.0f;
 
   void finish(SourceMaterial& m) const {
+    if (!has_kd && !m.diffuse_map.empty()) m.diffuse = glm::vec3(1.0f);
     const auto light = [](const glm::vec3& stored) {
       glm::dvec3 linear(0.0);
       for (int i = 0; i < 3; ++i) linear[i] = linear_of_srgb(static_cast<double>(stored[i]));
@@ -310,7 +312,10 @@ void take_property(std::string_view key, std::string_view text, MtlContext& cont
                    MtlStatements& stated, SourceMaterial& material) {
   std::array<float, 3> v{};
   if (key == "ka") take_colour(text, material.ambient);
-  if (key == "kd") take_colour(text, material.diffuse);
+  if (key == "kd") {
+    take_colour(text, material.diffuse);
+    stated.has_kd = true;
+  }
   if (key == "ks") take_colour(text, material.specular);
   if (key == "ke") take_colour(text, material.emission);
   if (key == "ns" && take_numbers(text, v) > 0) material.shininess = std::max(v[0], 0.0f);
