@@ -47,7 +47,7 @@ Bytes plain_octahedron() {
   BundleContent content = model_content();
   MaterialRecord& material = content.materials[0];
   std::fill_n(material.ambient, 3, 0.2f);
-  std::fill_n(material.diffuse, 3, 0.8f);
+  std::fill_n(material.diffuse, 3, 229.0f / 255.0f);
   std::fill_n(material.specular, 3, 0.0f);
   material.shininess = 0;
   material.flags = 0;
