@@ -107,6 +107,7 @@ DOORS = {
     "bake/mesh/lod": ("mesh_levels.hpp", "reduce.hpp"),
     "bake/texture": ("texture.hpp", "texture_codec.hpp", "texture_stage.hpp"),
     "bake/texture/atlas": ("atlas.hpp",),
+    "bake/texture/relief": ("relief.hpp",),
     "bake/pattern": ("pattern.hpp", "alike_patterns.hpp"),
     "bake/options": ("request.hpp", "request_text.hpp", "options.hpp"),
     "bake/bundle": ("bundle_builder.hpp", "bundle_json.hpp", "link_bundles.hpp"),

@@ -27,6 +27,7 @@
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/pattern/alike_patterns.hpp"
 #include "bake/pattern/pattern.hpp"
+#include "bake/texture/relief/relief.hpp"
 #include "bake/texture/texture_stage.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/content_summary.hpp"
@@ -182,7 +183,8 @@ void note_files(const SourceModel& source, std::vector<std::string>& files) {
   files.insert(files.end(), source.files.begin(), source.files.end());
   for (const SourceMaterial& material : source.materials) {
     if (material.keeper != nullptr) continue;
-    for (const std::string& map : {material.diffuse_map, material.alpha_map}) {
+    for (const std::string& map :
+         {material.diffuse_map, material.alpha_map, material.normal.path}) {
       if (!map.empty()) files.push_back(map);
     }
   }
@@ -210,6 +212,10 @@ Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& 
   if (request.most_triangles != 0) {
     *mesh = reduce(std::move(*mesh), request.most_triangles, report);
   }
+  MODAR_TRY(draw_relief(
+      *mesh,
+      {rotation_of(report.uprights.back().axis, {}), request.textures.max_side, request.jobs},
+      report));
   WeldedModel welded{std::move(*mesh), {}};
   welded.uses = collect_textures(welded.mesh, textures);
   return welded;

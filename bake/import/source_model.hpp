@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include <glm/mat3x3.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
@@ -18,6 +19,17 @@ namespace modar {
 /// Stored red, green and blue of what states no colour: in the renderer's own room, the part that
 /// faces the key light is just not clipped. No file states it to the last bit.
 inline constexpr float kClay = 229.0f / 255.0f;
+
+/// A picture of the directions in which a surface looks, about its own: red to rising u, green to
+/// the picture's top, blue straight on.
+struct NormalMap {
+  std::string path;             ///< empty: none
+  float scale = 1.0f;           ///< factor on red and green
+  bool may_be_heights = false;  ///< MTL files name both alike: a grey picture is one of heights
+  glm::dmat3 uv{1.0};           ///< from the base colour's uv, v down, to the map's
+
+  bool operator==(const NormalMap&) const = default;
+};
 
 /// A material of an MTL or glTF file. Map paths are resolved against the file that names them and
 /// exist; empty where there is no map, or where it was not found (then there is a diagnostic).
@@ -33,6 +45,7 @@ struct SourceMaterial {
   float opacity = 1.0f;
   std::string diffuse_map;
   std::string alpha_map;
+  NormalMap normal;
   bool two_sided = false;
   bool see_through = false;  ///< its picture has alpha; unknown (false) until it has been read
   /// Named "occluder": stands for a real thing, hides what is behind it and is not seen itself.

@@ -235,7 +235,7 @@ TEST_F(Gltf, RequiredExtensionsAreReadOrRefusedByName) {
   std::sort(ids.begin(), ids.end());
   EXPECT_EQ(ids, (std::vector<std::string>{"gltf.alpha-mask", "gltf.left-out"}));
   EXPECT_EQ(used->diagnostics.back().message,
-            "left out: 1 animation, 1 normal map, extensions KHR_materials_clearcoat");
+            "left out: 1 animation, extensions KHR_materials_clearcoat");
 }
 
 TEST_F(Gltf, GlassAndGlossinessHaveTheCoresNearest) {
@@ -417,6 +417,36 @@ TEST_F(Gltf, TextureTransformsMoveTheUv) {
   expect(0, 0.5, 0.25);
   expect(1, 0.5, 0.25 - 2);
   expect(2, 0.5 + 4, 0.25);
+}
+
+TEST_F(Gltf, NormalMapsHaveTheirScaleAndPlaceOnTheColour) {
+  ASSERT_TRUE(write_png({1, 1, {128, 128, 255, 255}}, (folder_ / "n.png").string()));
+  const auto model = read(
+      std::string(kOneTriangle) +
+          R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],
+          "images":[{"uri":"n.png"}],"textures":[{"source":0}],
+          "materials":[{"normalTexture":{"index":0,"scale":0.5}},
+          {"pbrMetallicRoughness":{"baseColorTexture":{"index":0,"extensions":
+           {"KHR_texture_transform":{"scale":[2,2],"offset":[0.5,0]}}}},
+           "normalTexture":{"index":0,"extensions":{"KHR_texture_transform":{"scale":[8,4]}}}},
+          {"normalTexture":{"index":0,"texCoord":1}},
+          {"normalTexture":{"index":0},"extensions":{"KHR_materials_unlit":{}}}],
+          "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])",
+      one_triangle());
+  ASSERT_TRUE(model) << to_line(model.error());
+  const auto normal = [&](std::size_t material) { return model->materials[material].normal; };
+  EXPECT_EQ(fs::path(normal(0).path), folder_ / "n.png");
+  EXPECT_FLOAT_EQ(normal(0).scale, 0.5f);
+  EXPECT_FALSE(normal(0).may_be_heights);
+  EXPECT_EQ(normal(0).uv, glm::dmat3(1.0));
+  // The file's (1, 1) is (2.5, 2) on the colour and (8, 4) on the map.
+  const glm::dvec3 at = normal(1).uv * glm::dvec3(2.5, 2, 1);
+  EXPECT_NEAR(at.x, 8, 1e-12);
+  EXPECT_NEAR(at.y, 4, 1e-12);
+  EXPECT_TRUE(normal(2).path.empty()) << "another set of uvs";
+  EXPECT_TRUE(normal(3).path.empty()) << "unlit";
+  ASSERT_EQ(model->diagnostics.size(), 1U);
+  EXPECT_EQ(model->diagnostics[0].id, "gltf.normal-map");
 }
 
 TEST_F(Gltf, DracoPrimitivesAreWhatTheEncoderWasGiven) {

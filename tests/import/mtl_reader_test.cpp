@@ -95,6 +95,27 @@ TEST_F(MtlReader, ReadsProperties) {
   EXPECT_EQ(findings_[1].id, "mtl.invisible");
 }
 
+TEST_F(MtlReader, NormalMapsHaveSeveralNames) {
+  const auto m = parse(
+      "newmtl a\nmap_Bump -bm 0.25 wood.jpg\n"
+      "newmtl b\nbump wood.jpg\nnorm -s 1 1 1 two words.png\n"
+      "newmtl c\nnorm two words.png\nmap_bump wood.jpg\n"
+      "newmtl d\nnorm missing.png\n");
+  ASSERT_EQ(m.size(), 4u);
+  const auto name = [&](std::size_t i) { return fs::path(m[i].normal.path).filename().string(); };
+  EXPECT_EQ(name(0), "wood.jpg");
+  EXPECT_EQ(m[0].normal.scale, 0.25f);
+  EXPECT_TRUE(m[0].normal.may_be_heights);
+  for (const std::size_t i : {1U, 2U}) {
+    EXPECT_EQ(name(i), "two words.png") << i;
+    EXPECT_EQ(m[i].normal.scale, 1.0f);
+    EXPECT_FALSE(m[i].normal.may_be_heights) << i;
+  }
+  EXPECT_EQ(name(3), "");
+  ASSERT_EQ(findings_.size(), 1u);
+  EXPECT_EQ(findings_[0].id, "mtl.missing-map");
+}
+
 TEST_F(MtlReader, ReflectionFollowsFromWhatTheMaterialStates) {
   const auto m = parse(
       "newmtl matt\nKd 0.5\nnewmtl shiny\nKd 0.5\nKs 0.5\nNs 50\n"

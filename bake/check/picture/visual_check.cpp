@@ -11,11 +11,14 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "bake/bundle/bundle_builder.hpp"
+#include "bake/bundle/bundle_json.hpp"
+#include "bake/bundle/scene/scene_placement.hpp"
 #include "bake/check/picture/reference_renderer.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/image/difference.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/weld/weld.hpp"
+#include "bake/texture/relief/relief.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/renderer.hpp"
 
@@ -82,7 +85,13 @@ class Looker {
   Result<ModelLook> look(std::uint32_t index, const std::string& path) {
     Report quiet;
     MODAR_ASSIGN(SourceModel source, read_model(path, options_.jobs));
-    MODAR_ASSIGN(const TriMesh mesh, weld(std::move(source), quiet, {options_.jobs}));
+    MODAR_ASSIGN(TriMesh mesh, weld(std::move(source), quiet, {options_.jobs}));
+    const auto upright = stated_upright(bundle_, index);
+    ReliefOptions relief;
+    relief.stands = rotation_of(upright ? upright->axis : UpAxis::kZ, {});
+    relief.max_side = kMaxImageSide;
+    relief.jobs = options_.jobs;
+    MODAR_TRY(draw_relief(mesh, relief, quiet));
     ModelLook look;
     look.name = bundle_.name(bundle_.models()[index].name);
     look.judged = !translucent(mesh);

@@ -13,6 +13,9 @@
 #include <span>
 #include <system_error>
 
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+
 #include "bake/import/conversion.hpp"
 #include "bake/import/gltf/gltf_pictures.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
@@ -123,6 +126,46 @@ tinygltf::PbrMetallicRoughness metallic_roughness_of(const tinygltf::Value& glos
   return pbr;
 }
 
+// Scales, turns, moves: the order and the sense of Khronos' sample viewer. (The matrix in the
+// extension's text turns the other way; viewers, and the extension's test model, turn this way.)
+
+void take_pair(const tinygltf::Value& transform, const char* key, glm::dvec2& pair) {
+  if (!transform.Has(key)) return;
+  const tinygltf::Value& value = transform.Get(key);
+  if (!value.IsArray() || value.ArrayLen() != 2) return;
+  const tinygltf::Value& x = value.Get(0);
+  const tinygltf::Value& y = value.Get(1);
+  if (x.IsNumber() && y.IsNumber()) pair = {x.GetNumberAsDouble(), y.GetNumberAsDouble()};
+}
+
+/// Info: a texture of a material, with `texCoord` and `extensions`.
+template <class Info>
+GltfUv uv_of(const Info& texture) {
+  GltfUv uv;
+  int set = texture.texCoord;
+  const auto found = texture.extensions.find("KHR_texture_transform");
+  if (found != texture.extensions.end() && found->second.IsObject()) {
+    const tinygltf::Value& transform = found->second;
+    take_pair(transform, "offset", uv.offset);
+    take_pair(transform, "scale", uv.scale);
+    if (transform.Has("rotation") && transform.Get("rotation").IsNumber()) {
+      uv.rotation = transform.Get("rotation").GetNumberAsDouble();
+    }
+    if (transform.Has("texCoord") && transform.Get("texCoord").IsInt()) {
+      set = transform.Get("texCoord").GetNumberAsInt();
+    }
+  }
+  uv.attribute = "TEXCOORD_" + std::to_string(set);
+  return uv;
+}
+
+/// GltfUv::apply() as a matrix.
+glm::dmat3 matrix_of(const GltfUv& uv) {
+  const glm::dvec2 origin = uv.apply({0, 0});
+  return {glm::dvec3(uv.apply({1, 0}) - origin, 0.0), glm::dvec3(uv.apply({0, 1}) - origin, 0.0),
+          glm::dvec3(origin, 1.0)};
+}
+
 class MaterialReader {
  public:
   MaterialReader(const tinygltf::Model& gltf, std::string folder, std::string label,
@@ -144,6 +187,7 @@ class MaterialReader {
     m.two_sided = source.doubleSided;
     set_reflection_of(pbr, m);
     set_pictures(source, m);
+    set_normal_map(source, m);
     m.opacity *= 1 - kClear * transmission_of(source);
     m.ambient = m.diffuse;
     if (folder_of_images_ != nullptr) m.keeper = folder_of_images_;
@@ -166,6 +210,9 @@ class MaterialReader {
         "have an occlusion map; the base colour is darkened by half of it");
     add("gltf.occlusion-map", occlusion_.left_out,
         "have an occlusion map with other texture coordinates than the base colour, which is "
+        "ignored");
+    add("gltf.normal-map", normals_left_out_,
+        "have a normal map with another set of texture coordinates than the base colour, which is "
         "ignored");
     add("gltf.metal-map", averaged_,
         "have a metallic-roughness map; its means set the highlight of the whole material");
@@ -245,6 +292,25 @@ class MaterialReader {
     if (pictures.emissive.empty() || m.diffuse_map == pictures.colour) return;
     m.diffuse = glm::vec3(1.0f);  // it is in the picture
     m.emission = glm::vec3(0.0f);
+  }
+
+  /// Nothing is lit of an unlit material.
+  void set_normal_map(const tinygltf::Material& source, SourceMaterial& m) {
+    const tinygltf::NormalTextureInfo& info = source.normalTexture;
+    if (info.index < 0 || source.extensions.count("KHR_materials_unlit") != 0) return;
+    const GltfUv colour = uv_of(source.pbrMetallicRoughness.baseColorTexture);
+    const GltfUv normal = uv_of(info);
+    const glm::dmat3 to_colour = matrix_of(colour);
+    if (colour.attribute != normal.attribute || !(std::fabs(glm::determinant(to_colour)) > 1e-12)) {
+      ++normals_left_out_;
+      return;
+    }
+    m.normal.path = image_path(info.index);
+    m.normal.scale = static_cast<float>(info.scale);
+    if (colour.offset != normal.offset || colour.scale != normal.scale ||
+        colour.rotation != normal.rotation) {
+      m.normal.uv = matrix_of(normal) * glm::inverse(to_colour);
+    }
   }
 
   /// The path of what the shader draws: the picture itself, or a new one in the temporary folder.
@@ -347,6 +413,7 @@ class MaterialReader {
   std::map<std::string, RoughnessMetalness> means_;  ///< by path: 1 where it cannot be read
   Count emissive_;
   Count occlusion_;
+  int normals_left_out_ = 0;
   int averaged_ = 0;
   int cut_out_ = 0;
 };
@@ -397,21 +464,6 @@ std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const st
   reader.report();
   return materials;
 }
-namespace {
-
-// Scales, turns, moves: the order and the sense of Khronos' sample viewer. (The matrix in the
-// extension's text turns the other way; viewers, and the extension's test model, turn this way.)
-
-void take_pair(const tinygltf::Value& transform, const char* key, glm::dvec2& pair) {
-  if (!transform.Has(key)) return;
-  const tinygltf::Value& value = transform.Get(key);
-  if (!value.IsArray() || value.ArrayLen() != 2) return;
-  const tinygltf::Value& x = value.Get(0);
-  const tinygltf::Value& y = value.Get(1);
-  if (x.IsNumber() && y.IsNumber()) pair = {x.GetNumberAsDouble(), y.GetNumberAsDouble()};
-}
-
-}  // namespace
 
 glm::dvec2 GltfUv::apply(const glm::dvec2& uv) const {
   const glm::dvec2 scaled = scale * uv;
@@ -421,25 +473,9 @@ glm::dvec2 GltfUv::apply(const glm::dvec2& uv) const {
 }
 
 GltfUv gltf_uv(const tinygltf::Model& gltf, int material) {
-  GltfUv uv;
-  if (material < 0 || static_cast<std::size_t>(material) >= gltf.materials.size()) return uv;
-  const tinygltf::TextureInfo& texture =
-      gltf.materials[static_cast<std::size_t>(material)].pbrMetallicRoughness.baseColorTexture;
-  int set = texture.texCoord;
-  const auto found = texture.extensions.find("KHR_texture_transform");
-  if (found != texture.extensions.end() && found->second.IsObject()) {
-    const tinygltf::Value& transform = found->second;
-    take_pair(transform, "offset", uv.offset);
-    take_pair(transform, "scale", uv.scale);
-    if (transform.Has("rotation") && transform.Get("rotation").IsNumber()) {
-      uv.rotation = transform.Get("rotation").GetNumberAsDouble();
-    }
-    if (transform.Has("texCoord") && transform.Get("texCoord").IsInt()) {
-      set = transform.Get("texCoord").GetNumberAsInt();
-    }
-  }
-  uv.attribute = "TEXCOORD_" + std::to_string(set);
-  return uv;
+  if (material < 0 || static_cast<std::size_t>(material) >= gltf.materials.size()) return {};
+  return uv_of(
+      gltf.materials[static_cast<std::size_t>(material)].pbrMetallicRoughness.baseColorTexture);
 }
 
 }  // namespace modar

@@ -317,12 +317,8 @@ void report_left_out(const tinygltf::Model& gltf, const LeftOut& counts, const s
     if (count == 0) return;
     words += (words.empty() ? "" : ", ") + std::to_string(count) + " " + (count == 1 ? one : many);
   };
-  const auto normal_maps = static_cast<std::size_t>(
-      std::count_if(gltf.materials.begin(), gltf.materials.end(),
-                    [](const auto& material) { return material.normalTexture.index >= 0; }));
   add(gltf.animations.size(), "animation", "animations");
   add(counts.morphs, "set of morph targets", "sets of morph targets");
-  add(normal_maps, "normal map", "normal maps");
   add(counts.second_uvs, "second uv set", "second uv sets");
   add(counts.lines_and_points, "primitive of lines or points", "primitives of lines or points");
   add(gltf.cameras.size(), "camera", "cameras");

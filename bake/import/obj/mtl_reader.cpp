@@ -308,6 +308,14 @@ struct MtlStatements {
   }
 };
 
+/// The factor of the option -bm.
+float bump_factor(std::string_view text) {
+  const std::size_t at = text.find("-bm ");
+  std::array<float, 3> values{};
+  return at != std::string_view::npos && take_numbers(text.substr(at + 4), values) > 0 ? values[0]
+                                                                                       : 1.0f;
+}
+
 void take_property(std::string_view key, std::string_view text, MtlContext& context,
                    MtlStatements& stated, SourceMaterial& material) {
   std::array<float, 3> v{};
@@ -337,6 +345,13 @@ void take_property(std::string_view key, std::string_view text, MtlContext& cont
   }
   if (key == "map_kd") take_map(text, context, material.diffuse_map);
   if (key == "map_d") take_map(text, context, material.alpha_map);
+  // Many name a normal map by the words for heights; `norm` is one for sure.
+  const bool bump = key == "bump" || key == "map_bump";
+  if (key == "norm" || key == "map_norm" || (bump && material.normal.path.empty())) {
+    take_map(text, context, material.normal.path);
+    material.normal.may_be_heights = bump;
+    material.normal.scale = bump_factor(text);
+  }
 }
 
 }  // namespace
