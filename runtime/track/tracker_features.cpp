@@ -196,7 +196,7 @@ std::array<Point, 2 * kTests> test_points() {
 }
 
 /// Offsets of all end points for every orientation, in a buffer of that stride.
-std::vector<std::int32_t> test_offsets(int stride) {
+[[gnu::cold]] std::vector<std::int32_t> test_offsets(int stride) {
   const auto points = test_points();
   // cos and sin of 2 pi / 64, then the angle addition formula: no rounding depends on a libm.
   constexpr double kCos = 0.99518472667219688624;
@@ -273,10 +273,10 @@ struct FeatureExtractor::State {
 };
 
 FeatureExtractor::FeatureExtractor(std::unique_ptr<State> state) : state_(std::move(state)) {}
-FeatureExtractor::~FeatureExtractor() = default;
+[[gnu::cold]] FeatureExtractor::~FeatureExtractor() = default;
 
-std::unique_ptr<FeatureExtractor> FeatureExtractor::create(int width, int height,
-                                                           const DetectOptions& options) {
+[[gnu::cold]] std::unique_ptr<FeatureExtractor> FeatureExtractor::create(
+    int width, int height, const DetectOptions& options) {
   auto state = std::make_unique<State>(width, options);
   state->pitch = (width + kSlack + 63) / 64 * 64;
   std::size_t cells = 0;
