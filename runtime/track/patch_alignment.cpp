@@ -648,13 +648,13 @@ Jacobian8 plane_jacobian(const PatchLinearisation& patch, const glm::dmat2& of_w
   return rows;
 }
 
-void add(const PatchLinearisation& patch, const Jacobian8& j, PlaneEquations& sum) {
+void add(const PatchLinearisation& patch, double weight, const Jacobian8& j, PlaneEquations& sum) {
   const PatchNormalEquations& one = patch.equations;
-  const double xx = static_cast<double>(one.xx);
-  const double xy = static_cast<double>(one.xy);
-  const double yy = static_cast<double>(one.yy);
-  const double ex = static_cast<double>(one.ex);
-  const double ey = static_cast<double>(one.ey);
+  const double xx = weight * static_cast<double>(one.xx);
+  const double xy = weight * static_cast<double>(one.xy);
+  const double yy = weight * static_cast<double>(one.yy);
+  const double ex = weight * static_cast<double>(one.ex);
+  const double ey = weight * static_cast<double>(one.ey);
   for (std::size_t row = 0; row < 8; ++row) {
     const double gx = xx * j[0][row] + xy * j[1][row];
     const double gy = xy * j[0][row] + yy * j[1][row];
@@ -730,8 +730,9 @@ PatchFit align_plane(TrackedPattern& pattern, const FrameView& frame, int frame_
     fit = linearise(pattern, frame, view, fit.covered() ? kTukeyCovered : kTukey, pose, patches);
     const glm::dmat2 of_world = glm::dmat2(scale, 0.0, 0.0, -scale) * glm::inverse(pattern.shape);
     PlaneEquations sum;
+    const bool open = fit.open();
     for (const PatchLinearisation& patch : patches) {
-      add(patch, plane_jacobian(patch, of_world), sum);
+      add(patch, open ? 1.0 : trust(frame, patch), plane_jacobian(patch, of_world), sum);
     }
     std::array<double, 6> by{};
     if (fit.visible < 4 || !solve(sum, by, change)) break;

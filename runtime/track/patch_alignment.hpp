@@ -143,9 +143,11 @@ struct PatchFit {
   double inlier_correlation = 0;  ///< mean over the inliers
   double unrest = 0;  ///< of a flat pattern of which little shows: rms of what the inliers ask for
   [[nodiscard]] double inlier_ratio() const { return visible > 0 ? 1.0 * inliers / visible : 0.0; }
+  /// So many patches fit that nothing covers much of the pattern. By hand.
+  [[nodiscard]] bool open() const { return inlier_ratio() >= 0.6; }
   /// Few patches fit, but these do so as nothing blurred does: something covers the others. By
   /// hand.
-  [[nodiscard]] bool covered() const { return inlier_ratio() < 0.6 && inlier_correlation >= 0.85; }
+  [[nodiscard]] bool covered() const { return !open() && inlier_correlation >= 0.85; }
   /// The patches that fit contradict each other: chance holds some of them, and the pose.
   [[nodiscard]] bool restless() const { return unrest >= kUnrest; }
   /// Six inliers determine a pose with a margin of two; a ratio of 0.3 keeps chance agreement out,
@@ -183,8 +185,8 @@ struct PlaneChange {
 };
 /// Gauss-Newton on a flat pattern's pose together with two numbers of its shape, by which both are
 /// a free homography's eight; all patches of the level, or about `count`, weighed by their
-/// correlation alone. change: from the shape before, and how a pose that is weighed otherwise
-/// follows it.
+/// correlation, and where much is covered, by what they leave unexplained. change: from the shape
+/// before, and how a pose that is weighed otherwise follows it.
 PatchFit align_plane(TrackedPattern& pattern, const FrameView& frame, int frame_level, int steps,
                      std::size_t count, Pose& pose, PlaneChange& change);
 

@@ -17,8 +17,8 @@ namespace {
 // Frames between measurements of a plane for the camera's estimate: trades their time, half of that
 // of tracking, for how soon the camera is known. The next one comes after kMeasureSoon frames if
 // the last one moved a corner by kMovedShape pixels: with a wrong focal length, the shape lags
-// behind a rotation. A plane counts as flat and uncovered if at least kFlatPatches patches fit, and
-// kFlatRatio of those in view.
+// behind a rotation. A plane counts as flat if at least kFlatPatches patches fit,
+// and as open where kFlatRatio of those in view do.
 constexpr int kMeasureEvery = 5;
 constexpr int kMeasureSoon = 2;
 constexpr double kMovedShape = 0.4;
@@ -32,7 +32,7 @@ constexpr double kNewShape = 0.7;
 constexpr double kLearnedAnew = 0.01;
 
 bool shows_flat(const PatchFit& fit) {
-  return fit.inliers >= kFlatPatches && (fit.inlier_ratio() >= kFlatRatio || fit.covered());
+  return fit.inliers >= kFlatPatches && (fit.open() || fit.covered());
 }
 
 /// Four points of a pattern, the corners of the part of it that is in the frame, with their pixels;
@@ -128,7 +128,7 @@ bool SelfCalibration::measure_first(std::size_t i, CameraEstimator::View& view, 
   }
   track.pose = split.pose;
   patterns_[i].shape = split.shape;
-  open = fit.inlier_ratio() >= kFlatRatio;
+  open = fit.open();
   return true;
 }
 

@@ -154,6 +154,19 @@ TEST(UnknownCamera, CornersOfAHalfCoveredPrintLieRight) {
   }
 }
 
+// At once, from what shows of it alone: a pose of the default camera fits a part of that.
+TEST(UnknownCamera, CornersOfAMostlyCoveredPrintLieRightInItsFirstFrame) {
+  int shown = 0;
+  for (const double tilt : {0.0, 10.0, 20.0, 30.0, 40.0}) {
+    for (const double focal : {0.7, 0.85, 1.2}) {
+      const Played one = play(lens_of(640, 480, 640 * focal), 1.03, 1, true, tilt, 0.65);
+      shown += one.shown;
+      EXPECT_LT(one.worst, 2.0) << tilt << " " << focal;
+    }
+  }
+  EXPECT_GE(shown, 14);
+}
+
 TEST(UnknownCamera, TheFocalLengthIsFoundWithItsSpread) {
   for (const double focal : {520.0, 840.0}) {
     const Played one = play(lens_of(640, 480, focal), 1.0, 4 * kSecond, true);
