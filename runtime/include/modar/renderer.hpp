@@ -158,9 +158,9 @@ struct RenderOptions {
   /// Samples per pixel of render(), for smooth edges; limited by the driver. Takes effect at the
   /// next resize(). draw() uses those of the app's surface.
   int samples = 1;
-  bool instancing = true;   ///< items of one mesh or material share draw calls
-  /// Largest error of a level of detail on the screen, in pixels. More where a frame would have more
-  /// than a million triangles, or 100,000 where caps.gpu_memory is limited.
+  bool instancing = true;  ///< items of one mesh or material share draw calls
+  /// Largest error of a level of detail on the screen, in pixels. More where a frame would have
+  /// more than a million triangles, or 100,000 where caps.gpu_memory is limited.
   float lod_pixels = 1.0f;
 };
 
