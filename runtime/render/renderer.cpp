@@ -10,6 +10,7 @@
 #include <glm/mat2x2.hpp>
 #include <glm/matrix.hpp>
 
+#include "formats/memory_share.hpp"
 #include "formats/transport/stages.hpp"
 #include "runtime/render/draw_list.hpp"
 #include "runtime/render/geometry_store.hpp"
@@ -129,22 +130,10 @@ struct Renderer::State {
       : bundle(view),
         caps(context_caps),
         formats(vertex_formats(bundle, caps)),
-        geometry(bundle, formats, geometry_budget(view, context_caps)),
+        geometry(bundle, formats, geometry_share(view, context_caps.gpu_memory)),
         textures(bundle, caps),
         painter(bundle, formats, batch_budget()) {
     estimator.create(bundle);
-  }
-
-  /// Half of the memory is for each kind, unless all the geometry needs less.
-  static std::uint64_t geometry_budget(const BundleView& view, const GlCaps& caps) {
-    if (caps.gpu_memory == 0) return 0;
-    return caps.gpu_memory - std::min(caps.gpu_memory / 2, texture_bytes(view));
-  }
-
-  static std::uint64_t texture_bytes(const BundleView& view) {
-    std::uint64_t bytes = 0;
-    for (std::uint32_t i = 0; i < view.textures().size(); ++i) bytes += view.texture_data(i).size();
-    return bytes;
   }
 
   /// What geometry and textures leave; nothing where not even they fit.

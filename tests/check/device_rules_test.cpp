@@ -105,6 +105,25 @@ TEST(Device, MemoryThatHoldsTheCoarsestLevelsIsEnough) {
   EXPECT_TRUE(findings(encode(content), device)[0].starts_with("DEVICE_GPU_MEMORY "));
 }
 
+/// The renderer reserves half for textures: what then is missing of the coarsest level is not
+/// drawn.
+TEST(Device, TexturesTakeTheirHalfFromTheCoarsestLevels) {
+  BundleContent content = texture_content();
+  content.texture_data[0].resize(3u << 20);
+  BundleContent model = model_content();
+  model.textures = content.textures;
+  model.texture_levels = content.texture_levels;
+  model.texture_data = content.texture_data;
+  model.layouts[0].stride = 240;
+  model.vertices.resize(std::size_t{12000} * 240);
+  for (LevelRecord& level : model.levels) level.vertex_count = 5000;  // two chunks: 2.4 MB
+  DeviceProfile device = roomy();
+  device.gpu_memory_mib = 4;  // 2 of them are for geometry
+  EXPECT_TRUE(findings(encode(model), device).at(0).starts_with("DEVICE_GPU_MEMORY "));
+  device.gpu_memory_mib = 5;
+  EXPECT_TRUE(findings(encode(model), device).at(0).starts_with("DEVICE_GPU_DETAIL "));
+}
+
 TEST(Verdict, CountsAllButListsTwentyOfAKind) {
   Verdict verdict;
   const IssueKind& kind = workstation_issue_kind(WorkstationRule::kDeviceEtc1);

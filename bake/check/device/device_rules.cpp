@@ -5,14 +5,15 @@
 #include <string>
 
 #include "bake/check/verdict.hpp"
+#include "formats/memory_share.hpp"
 #include "formats/texture_format.hpp"
 
 namespace modar {
 namespace {
 
 constexpr std::uint64_t kMebibyte = 1u << 20;
-/// Vec4s of shaders/model.vert: projection 4, place in the scene 4, light and material 5.
-constexpr int kVertexUniforms = 13;
+/// Vec4s of shaders/model.vert: projection 4, place in the scene 4, light 9, material 5.
+constexpr int kVertexUniforms = 22;
 /// Vec4s of the fragment shaders: opacity, or a camera picture's range and swap.
 constexpr int kFragmentUniforms = 2;
 constexpr std::uint64_t kDecodedPixelBytes = 3;  ///< RGB8
@@ -86,24 +87,31 @@ class DeviceCheck {
                std::to_string(device_.max_vertex_attributes));
     }
     most_coarse_bytes_ = std::max(most_coarse_bytes_, coarse_bytes(index));
-    std::uint64_t half_bytes = 0;
-    for (std::uint32_t a = 0; a < layout.attribute_count; ++a) {
-      const AttributeRecord& attribute = layout.attributes[a];
-      if (attribute.type == static_cast<std::uint8_t>(ComponentType::kHalf)) {
-        half_bytes += 2ull * attribute.components;
-      }
-    }
-    if (half_ || half_bytes == 0) return;
-    widened_bytes_ += half_bytes * model.vertex_count;
+    const std::uint64_t halves = half_bytes(layout);
+    if (half_ || halves == 0) return;
+    widened_bytes_ += halves * model.vertex_count;
     tell(WorkstationRule::kDeviceHalfFloat, where, &layout,
-         std::to_string(half_bytes) + " bytes of each of " + std::to_string(model.vertex_count) +
+         std::to_string(halves) + " bytes of each of " + std::to_string(model.vertex_count) +
              " vertices");
   }
 
-  /// Vertices and indices of the coarsest level of each chunk; of a model's stand-in that needs
-  /// least, where it has any.
+  /// Bytes of a vertex that are half floats.
+  static std::uint64_t half_bytes(const LayoutRecord& layout) {
+    std::uint64_t bytes = 0;
+    for (std::uint32_t a = 0; a < layout.attribute_count; ++a) {
+      const AttributeRecord& attribute = layout.attributes[a];
+      if (attribute.type == static_cast<std::uint8_t>(ComponentType::kHalf)) {
+        bytes += 2ull * attribute.components;
+      }
+    }
+    return bytes;
+  }
+
+  /// Vertices and indices of the coarsest level of each chunk, as the device has them; of a model's
+  /// stand-in that needs least, where it has any.
   [[nodiscard]] std::uint64_t coarse_bytes(std::uint32_t model) const {
-    const std::uint64_t stride = bundle_.layouts()[bundle_.models()[model].layout].stride;
+    const LayoutRecord& layout = bundle_.layouts()[bundle_.models()[model].layout];
+    const std::uint64_t stride = layout.stride + (half_ ? 0 : half_bytes(layout));
     std::uint64_t least = ~std::uint64_t{0};
     for (std::uint32_t g = 0; g < bundle_.chunk_groups(); ++g) {
       const ChunkGroup group = bundle_.chunk_group(g);
@@ -147,14 +155,15 @@ class DeviceCheck {
     const std::uint64_t gpu =
         bundle_.vertices().size() + widened_bytes_ + bundle_.indices().size() + texture_bytes_;
     const void* first = bundle_.bytes().data();
-    if (gpu > device_.gpu_memory_mib * kMebibyte) {
+    const std::uint64_t limit = device_.gpu_memory_mib * kMebibyte;
+    if (gpu > limit) {
       // The renderer keeps to the limit: it leaves out the largest mip levels, and what is nearest
       // gets its finest levels first.
-      const bool drawn = most_coarse_bytes_ + smallest_bytes_ <= device_.gpu_memory_mib * kMebibyte;
+      const bool drawn = most_coarse_bytes_ <= geometry_share(bundle_, limit) &&
+                         most_coarse_bytes_ + smallest_bytes_ <= limit;
       tell(drawn ? WorkstationRule::kDeviceGpuDetail : WorkstationRule::kDeviceGpuMemory,
            largest_asset(), first,
-           std::to_string(gpu) + " bytes in all, at most " +
-               std::to_string(device_.gpu_memory_mib * kMebibyte));
+           std::to_string(gpu) + " bytes in all, at most " + std::to_string(limit));
     }
     const std::uint64_t file = bundle_.bytes().size();
     if (file > device_.ram_mib * kMebibyte / 2) {
