@@ -153,7 +153,8 @@ void main() {
   mirrored *= 0.5 + 0.5 * a_normal.w;
 #endif
   // Schlick's approximation of Fresnel's equations.
-  added += mirrored * (u_mirror.z + u_mirror.w * pow(1.0 - min(abs(dot(n, ray)), 0.999), 5.0));
+  float e = 1.0 - abs(dot(n, ray));
+  added += mirrored * (u_mirror.z + u_mirror.w * e * e * e * e * e);
   vec3 halfway = normalize(u_key.xyz - ray);
   added += u_specular.rgb * pow(max(dot(n, halfway), 0.0001), u_specular.w);
   light = mix(light, mirrored, u_emission.w);
