@@ -58,8 +58,9 @@ struct Engine {
   modar_bundle* bundle = nullptr;
   modar_tracker* tracker = nullptr;
   modar_renderer* renderer = nullptr;
-  modar_renderer* coming = nullptr;  ///< that web_pass() fills
-  bool in_memory = false;            ///< all of the bundle is, not what kept_ranges() names alone
+  modar_renderer* coming = nullptr;                                     ///< that web_pass() fills
+  modar_render_options options = modar::sized<modar_render_options>();  ///< of `renderer`
+  bool in_memory = false;  ///< all of the bundle is, not what kept_ranges() names alone
   modar_camera camera = modar::sized<modar_camera>();
   double focal_sigma = 0;    ///< 0 where it is not estimated
   WebPose* poses = nullptr;  ///< one a pattern, with room for kMostOwn more
@@ -162,12 +163,20 @@ struct AllShown {
 int use_renderer(modar_renderer* renderer, int fixed) {
   modar_renderer_destroy(std::exchange(engine.renderer, renderer));
   if (renderer == nullptr) return engine.error.status;
-  auto options = modar::sized<modar_render_options>();
-  modar_render_options_default(&options);
-  options.exclusive = 1;
-  options.fixed_light = fixed;
-  modar_renderer_set_options(renderer, &options);
+  modar_render_options_default(&engine.options);
+  engine.options.exclusive = 1;
+  engine.options.fixed_light = fixed;
+  modar_renderer_set_options(renderer, &engine.options);
   return 0;
+}
+
+/// After another renderer has used the context: what was set up there is set up again.
+void take_context_back() {
+  if (engine.renderer == nullptr) return;
+  auto options = engine.options;
+  options.exclusive = 0;
+  modar_renderer_set_options(engine.renderer, &options);
+  modar_renderer_set_options(engine.renderer, &engine.options);
 }
 
 /// For what reads triangles: of models whose own are on the GPU alone, those of stand-ins.
@@ -261,11 +270,13 @@ EMSCRIPTEN_KEEPALIVE int web_begin_rest(int in_order) {
   modar_renderer_destroy(engine.coming);
   // Null where vertices have to be rewritten for this context: then all stays in memory.
   engine.coming = modar_renderer_create_part(engine.bundle, 1, nullptr);
+  take_context_back();
   if (in_order != 0) return 0;
   for (const modar::StageRange& range : engine.arriving->kept()) {
     modar_renderer_put(engine.coming, range.offset, engine.arriving->bytes().data() + range.offset,
                        static_cast<size_t>(range.size));
   }
+  take_context_back();
   return 0;
 }
 /// Bytes of the last stage.
@@ -274,6 +285,7 @@ EMSCRIPTEN_KEEPALIVE int web_pass(double at, const void* bytes, size_t size) {
   const std::span some(static_cast<const std::byte*>(bytes), size);
   const AllShown shown;
   modar_renderer_put(engine.coming, offset, bytes, size);
+  take_context_back();
   if (engine.coming == nullptr) engine.arriving->put(offset, some);
   const auto passed = engine.arriving->pass(offset, some);
   return passed ? 0 : failed(passed.error());
