@@ -32,8 +32,8 @@ constexpr int kCoarser = 5;
 /// Triangles of a frame, a draw call counted as some (see DrawList::cost()): 10 frames a second of
 /// a Mali-400, 60 of phones of five years later. Set by hand.
 constexpr std::uint64_t kMostTriangles = 1'000'000;
-/// The same where the GPU's memory is limited, as that of the slowest is: 100,000 triangles in 20
-/// draw calls take a Mali-400 10 ms.
+/// The same of GPUs without ES 3, which are from before 2013: 100,000 triangles in 20 draw calls
+/// take a Mali-400 10 ms.
 constexpr std::uint64_t kFewTriangles = 104'000;
 
 std::vector<VertexFormat> vertex_formats(const BundleView& bundle, const GlCaps& caps) {
@@ -225,7 +225,7 @@ struct Renderer::State {
   }
 
   bool list_fits() {
-    const std::uint64_t most = caps.gpu_memory == 0 ? kMostTriangles : kFewTriangles;
+    const std::uint64_t most = caps.es3 ? kMostTriangles : kFewTriangles;
     if (list.cost(bundle, 0, list.commands().size()) > most) return false;
     if (!geometry.streams() || bundle.stand_ins().empty()) return true;
     levels.clear();

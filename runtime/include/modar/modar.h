@@ -357,8 +357,8 @@ typedef struct modar_render_options {
   float ambient_strength; /* factor on ambient light */
   float clear_colour[4];
   float lod_pixels; /* largest error of a level of detail on the screen, in pixels; more where a
-                       frame would have more than a million triangles, or 100,000 where the memory
-                       of the GPU is limited */
+                       frame would have more than a million triangles, or 100,000 without
+                       OpenGL ES 3 */
   int exclusive;    /* 1: nothing else draws in the context; 0: every call restores GL's state */
   int fixed_light;  /* 1: light does not adapt to the camera's pictures of the patterns */
   int samples; /* samples per pixel of modar_renderer_render(), from the next resize on (4: smooth

@@ -160,7 +160,7 @@ struct RenderOptions {
   int samples = 1;
   bool instancing = true;  ///< items of one mesh or material share draw calls
   /// Largest error of a level of detail on the screen, in pixels. More where a frame would have
-  /// more than a million triangles, or 100,000 where caps.gpu_memory is limited.
+  /// more than a million triangles, or 100,000 where there is no ES 3.
   float lod_pixels = 1.0f;
 };
 
