@@ -79,15 +79,32 @@ bool set_common(CURL* handle, const TransferOptions& options, const std::string&
   if (const char* folder = std::getenv("SSL_CERT_DIR"); folder != nullptr && *folder != '\0') {
     set.set(CURLOPT_CAPATH, folder);
   }
-  // Small reads keep the rate limit smooth on slow links.
+  // Small reads keep the rate limit smooth.
   if (options.bytes_per_second != 0) set.set(CURLOPT_BUFFERSIZE, 2048L);
   return set.good();
 }
+
+/// Holds all transfers together to a number of bytes a second.
+struct RateLimit {
+  std::uint64_t bytes_per_second = 0;  ///< 0: none
+  Clock::time_point begin = Clock::now();
+
+  /// Sleeps until the bytes received are within the limit. Meanwhile the socket fills up, and the
+  /// server waits, too.
+  void wait(std::uint64_t received) const {
+    if (bytes_per_second == 0) return;
+    const double allowed = std::chrono::duration<double>(Clock::now() - begin).count();
+    const double taken = static_cast<double>(received) / static_cast<double>(bytes_per_second);
+    const double ahead = std::min(1.0, taken - allowed);
+    if (ahead > 0) std::this_thread::sleep_for(std::chrono::duration<double>(ahead));
+  }
+};
 
 /// A place for one attempt at a time; its handle keeps its connections.
 struct Download {
   Transfer* transfer = nullptr;  ///< nullptr: the place is free
   Attempts* attempts = nullptr;
+  const RateLimit* limit = nullptr;
   CURL* handle = nullptr;
   std::uint64_t asked_from = 0;
   bool status_checked = false;                 ///< the status code was looked at
@@ -108,6 +125,7 @@ std::size_t on_body(char* bytes, std::size_t unit, std::size_t count, void* user
   auto& download = *static_cast<Download*>(user);
   const std::size_t size = unit * count;
   download.attempts->count(size);
+  download.limit->wait(download.attempts->stats().bytes);  // here: curl reads 100 times in a row
   if (!download.status_checked) check_status(download);
   if (!download.welcome) return size;
   const auto body = std::as_bytes(std::span(bytes, size));
@@ -151,7 +169,8 @@ class CurlDownloader : public Downloader {
       : options_(std::move(options)),
         address_(std::move(address)),
         multi_(multi),
-        places_(std::max(1u, options_.parallel)) {
+        places_(std::max(1u, options_.parallel)),
+        limit_{options_.bytes_per_second} {
     for (Download& place : places_) {
       place.handle = curl_easy_init();
       ready_ = ready_ && set_common(place.handle, options_, address_);
@@ -169,14 +188,13 @@ class CurlDownloader : public Downloader {
  private:
   bool start(Transfer& transfer, Attempts& attempts);
   Outcome finish(Download& download, CURLcode code);
-  void limit_rate(const Attempts& attempts) const;
 
   TransferOptions options_;
   std::string address_;
   CURLM* multi_;
   std::vector<Download> places_;  // never grows: libcurl's callbacks point into it
   bool ready_ = true;             // all handles have their options
-  Clock::time_point begin_ = Clock::now();
+  RateLimit limit_;
 };
 
 /// There is a free place. False: the transfer's error says why.
@@ -184,7 +202,7 @@ bool CurlDownloader::start(Transfer& transfer, Attempts& attempts) {
   if (!attempts.begin(transfer)) return false;
   Download& download = *std::ranges::find(places_, nullptr, &Download::transfer);
   CURL* handle = download.handle;
-  download = {&transfer, &attempts, handle, transfer.have};
+  download = {&transfer, &attempts, &limit_, handle, transfer.have};
   Options set(handle);
   set.set(CURLOPT_URL, (address_ + "/" + transfer.path).c_str())
       .set(CURLOPT_RESUME_FROM_LARGE, static_cast<curl_off_t>(transfer.have))
@@ -203,17 +221,6 @@ Outcome CurlDownloader::finish(Download& download, CURLcode code) {
   const Answer answer = answer_of(download, code);
   curl_multi_remove_handle(multi_, download.handle);
   return download.attempts->end(*std::exchange(download.transfer, nullptr), answer);
-}
-
-/// Sleeps until the bytes received are within the rate limit. Meanwhile the socket fills up, and
-/// the server waits, too.
-void CurlDownloader::limit_rate(const Attempts& attempts) const {
-  if (options_.bytes_per_second == 0) return;
-  const double allowed = std::chrono::duration<double>(Clock::now() - begin_).count();
-  const double taken =
-      static_cast<double>(attempts.stats().bytes) / static_cast<double>(options_.bytes_per_second);
-  const double ahead = std::min(1.0, taken - allowed);
-  if (ahead > 0) std::this_thread::sleep_for(std::chrono::duration<double>(ahead));
 }
 
 Result<void> CurlDownloader::run(std::vector<Transfer>& transfers, Attempts& attempts) {
@@ -236,7 +243,6 @@ Result<void> CurlDownloader::run(std::vector<Transfer>& transfers, Attempts& att
         error = next.error;
       }
     }
-    limit_rate(attempts);
     int running = 0;
     curl_multi_perform(multi_, &running);
     int left = 0;

@@ -13,8 +13,9 @@ from programs import BIN, QUICK, ProgramTest, picture
 
 
 def sheet(path, side, wave):
-    """A wavy sheet of 2 * side * side triangles, as OBJ."""
-    lines = [f"v {x} {y} {3 * math.sin(x * wave) * math.cos(y * 0.3)}" for y in range(side + 1) for x in range(side + 1)]
+    """A wavy, rough sheet of 2 * side * side triangles, as OBJ: roughness travels at some ten bytes a vertex."""
+    lines = [f"v {x} {y} {3 * math.sin(x * wave) * math.cos(y * 0.3) + (x * 73856093 ^ y * 19349663) % 997 / 2000}"
+             for y in range(side + 1) for x in range(side + 1)]
     for y in range(side):
         for x in range(side):
             a = y * (side + 1) + x + 1
