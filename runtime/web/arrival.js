@@ -89,7 +89,7 @@ export class Source {
     if (!response.ok) throw Object.assign(this.#failed(`the server answered ${response.status}`), { final: response.status < 500 });
     this.total ||= from + (Number(response.headers.get('content-length')) || 0);
     let reader = response.body.getReader();
-    if (response.status === 206 && end === this.#stops[0]) {
+    if (response.status === 206 && end && end === this.#stops[0]) {
       reader = eager(reader, () => {
         this.#second = this.#open(end);
         this.#second.catch(() => {});  // told to #read()

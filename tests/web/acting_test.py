@@ -198,6 +198,7 @@ class Acting(ProgramTest):
           (globalThis.told ??= []).push(detail);
         })), document.getElementById('start').click()""")
         self.browser.wait("document.getElementById('viewer').state === 'seen'", "the picture")
+        self.browser.wait("performance.getEntriesByName('modar: whole').length === 1", "all of it, which actions wait for where something plays")
         self.browser.wait(f"({MARKS}).length === 1", "the label")
         mark, = self.browser.run(MARKS)
         self.assertEqual((mark["text"], mark["name"]), ("A", "A: The corner"))
