@@ -126,21 +126,25 @@ template <class Index>
 NearTriangle BasicLevelSurface<Index>::nearest_around(const glm::dvec3& point,
                                                       std::uint32_t start) const {
   NearTriangle best{distance_square(point, triangle(start)), start};
-  std::span<const Index> seen;
+  // Vertices around which all triangles have been looked at.
+  std::array<Index, 3 * kMostWalked> known;
+  std::size_t count = 0;
+  const auto is_known = [&](Index v) {
+    return std::find(known.begin(), known.begin() + count, v) != known.begin() + count;
+  };
   for (int steps = 0; steps < kMostWalked; ++steps) {
     const std::uint32_t at = best.triangle;
-    const std::span<const Index> around = indices_.subspan(3 * std::size_t{at}, 3);
-    for (const Index v : around) {
-      if (begins_[v + std::size_t{1}] - begins_[v] > kWidestFan) continue;
-      if (std::find(seen.begin(), seen.end(), v) != seen.end()) continue;
+    for (const Index v : indices_.subspan(3 * std::size_t{at}, 3)) {
+      if (begins_[v + std::size_t{1}] - begins_[v] > kWidestFan || is_known(v)) continue;
       for (std::uint32_t i = begins_[v]; i < begins_[v + std::size_t{1}]; ++i) {
         const std::uint32_t beside = corners_[i] / 3;
+        if (beside == at || std::any_of(corners(beside), corners(beside) + 3, is_known)) continue;
         const double square = distance_square(point, triangle(beside), best.square);
         if (square < best.square) best = {square, beside};
       }
+      known[count++] = v;
     }
     if (best.triangle == at) break;
-    seen = around;
   }
   return best;
 }
