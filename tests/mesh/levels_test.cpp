@@ -819,7 +819,7 @@ TEST(Levels, PixelsAreAsLargeAsWhatDiffersInThem) {
   for (int i = 0; i < kSide * kSide; ++i) {
     points.emplace_back(-1 + i % kSide * kStep, -1 + i / kSide * kStep, 0.0);
   }
-  const PixelCells cells(points);
+  PixelCells cells(points);
   // Of each point, of which the surface is even: the smallest pixel that shows no difference.
   const auto pixel = [&](const auto& difference_at) {
     std::vector<LookDifference> differences(points.size());

@@ -37,27 +37,13 @@ std::uint32_t spread(std::uint32_t x) {
   return (x | x << 2) & 0x09249249u;
 }
 
-/// Sums over a cell.
-struct Cell {
-  glm::vec3 normal{0.0f};
-  glm::vec3 colour{0.0f};
-  glm::vec2 slide{0.0f};
-  float area = 0;
-
-  void add(const LookDifference& d) {
-    normal += d.area * d.normal;
-    colour += d.area * d.colour;
-    slide += d.area * d.slide;
-    area += d.area;
-  }
-  /// Of 255. side: of the pixel.
-  [[nodiscard]] float shown(float side) const {
-    const glm::vec3 c = glm::abs(colour);
-    return (kNormalGain * glm::length(normal) + std::max({c.x, c.y, c.z}) +
-            std::min(kSlideGain * glm::length(slide) / side, kMostSlide * area)) /
-           area;
-  }
-};
+/// Of 255. sum: over a cell. side: of the pixel.
+float shown(const LookDifference& sum, float side) {
+  const glm::vec3 c = glm::abs(sum.colour);
+  return (kNormalGain * glm::length(sum.normal) + std::max({c.x, c.y, c.z}) +
+          std::min(kSlideGain * glm::length(sum.slide) / side, kMostSlide * sum.area)) /
+         sum.area;
+}
 
 }  // namespace
 
@@ -92,41 +78,59 @@ PixelCells::PixelCells(std::span<const glm::dvec3> points) {
   });
 }
 
-double PixelCells::share_above(std::span<const LookDifference> differences, unsigned bits) const {
+double PixelCells::share_above(unsigned bits) const {
   const auto side = static_cast<float>(std::ldexp(side_, -static_cast<int>(bits)));
   const unsigned shift = 3 * (kBits - bits);
   double all = 0;
   double above = 0;
-  Cell cell;
+  LookDifference cell;
   const auto close = [&] {
     if (cell.area > 0) {
       all += static_cast<double>(cell.area);
-      if (!(cell.shown(side) < kSame)) above += static_cast<double>(cell.area);
+      if (!(shown(cell, side) < kSame)) above += static_cast<double>(cell.area);
     }
     cell = {};
   };
   for (std::size_t i = 0; i < places_.size(); ++i) {
     if (i > 0 && places_[i].cell >> shift != places_[i - 1].cell >> shift) close();
-    cell.add(differences[places_[i].point]);
+    const LookDifference& d = weighed_[i];
+    cell.normal += d.normal;
+    cell.colour += d.colour;
+    cell.slide += d.slide;
+    cell.area += d.area;
   }
   close();
   return all > 0 ? above / all : 0.0;
 }
 
-double PixelCells::smallest_pixel(std::span<const LookDifference> differences) const {
-  double finer = share_above(differences, kBits);
-  if (finer <= kShare) return 0;
-  for (unsigned bits = kBits - 1;; --bits) {
-    const double share = share_above(differences, bits);
-    const double side = std::ldexp(side_, -static_cast<int>(bits));
-    if (share <= kShare) {
-      // Between the two sides, as a power law.
-      const double most = std::log(finer / std::max(share, kShare / 16));
-      return side * std::exp2(-1 + std::log(finer / kShare) / most);
-    }
-    if (bits == 0) return 2 * side;
-    finer = share;
+double PixelCells::smallest_pixel(std::span<const LookDifference> differences) {
+  weighed_.clear();
+  weighed_.reserve(places_.size());
+  for (const Place& place : places_) {
+    LookDifference& d = weighed_.emplace_back(differences[place.point]);
+    d.normal *= d.area;
+    d.colour *= d.area;
+    d.slide *= d.area;
   }
+  const double finest = share_above(kBits);
+  if (finest <= kShare) return 0;
+  // What differs in the finest averages out in larger ones, and goes on to.
+  double finer = finest;
+  double share = share_above(bits_);
+  for (; share <= kShare; ++bits_) {
+    finer = bits_ + 1 == kBits ? finest : share_above(bits_ + 1);
+    if (finer > kShare) break;
+    share = finer;
+  }
+  for (; share > kShare && bits_ > 0; --bits_) {
+    finer = share;
+    share = share_above(bits_ - 1);
+  }
+  const double side = std::ldexp(side_, -static_cast<int>(bits_));
+  if (share > kShare) return 2 * side;
+  // Between the two sides, as a power law.
+  const double most = std::log(finer / std::max(share, kShare / 16));
+  return side * std::exp2(-1 + std::log(finer / kShare) / most);
 }
 
 }  // namespace modar

@@ -49,11 +49,10 @@ class PixelCells {
   /// Side of the smallest pixel, in the points' unit, over which differences average out: but for 1
   /// % of the area, all pixels of a picture differ by less than 2 of 255. 0: any pixel will do.
   /// differences: one a point.
-  [[nodiscard]] double smallest_pixel(std::span<const LookDifference> differences) const;
+  [[nodiscard]] double smallest_pixel(std::span<const LookDifference> differences);
 
  private:
-  [[nodiscard]] double share_above(std::span<const LookDifference> differences,
-                                   unsigned bits) const;
+  [[nodiscard]] double share_above(unsigned bits) const;
 
   struct Place {
     std::uint32_t cell = 0;  ///< three bits a halving, the coarsest first
@@ -61,6 +60,10 @@ class PixelCells {
   };
   double side_ = 0;  ///< of the box
   std::vector<Place> places_;
+  std::vector<LookDifference> weighed_;  ///< by area, in the order of places_
+  /// Halvings to the last answer's cells, where the next search begins: the levels of one surface
+  /// come one after another. The first is set by hand: five scans have 3 to 6.
+  unsigned bits_ = 5;
 };
 
 }  // namespace modar
