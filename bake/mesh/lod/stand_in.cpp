@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <tuple>
 #include <unordered_map>
@@ -38,12 +39,18 @@ constexpr double kOftener = 1.41;
 /// At most so many triangles are looked at for the shading. Set by hand.
 constexpr std::size_t kMostLooks = 50'000;
 
-/// A surface of the whole model that others are measured against.
+/// A surface of the whole model that others are measured against. Moves, but is never copied, as
+/// `triangles` looks at the others.
 struct Measured {
+  Measured() = default;
+  Measured(Measured&&) = default;
+  Measured& operator=(Measured&&) = default;
+
   std::vector<glm::dvec3> positions;  ///< decoded
   std::vector<std::uint32_t> indices;
-  std::vector<std::uint32_t> places;  ///< of each vertex: of the collapser
-  double error = 0;                   ///< from level 0
+  std::vector<std::uint32_t> places;     ///< of each vertex: of the collapser
+  std::optional<MeshSurface> triangles;  ///< of the former two, once they are known
+  double error = 0;                      ///< from level 0
 };
 
 /// Coarse levels of all chunks, joined.
@@ -252,17 +259,14 @@ std::vector<std::uint32_t> near_triangles(const Measured& from, const MeshSurfac
   return near;
 }
 
-/// Bounds the distance of either surface from the other.
-double distance_both_ways(const Measured& fine, const Measured& coarse, MeshCollapser& collapser,
-                          std::size_t places, double least) {
-  MeshSurface a(fine.positions, fine.indices);
-  MeshSurface b(coarse.positions, coarse.indices);
+/// Bounds the distance of either surface from the other. at_fine, at_coarse: their triangles.
+double distance_both_ways(Measured& fine, const TrianglesAt& at_fine, Measured& coarse,
+                          const TrianglesAt& at_coarse, double least) {
   const std::vector<std::uint32_t> there =
-      near_triangles(fine, b, TrianglesAt(coarse, collapser, places), least);
-  const double found = surface_distance(a, b, there, least);
-  const std::vector<std::uint32_t> back =
-      near_triangles(coarse, a, TrianglesAt(fine, collapser, places), least);
-  return surface_distance(b, a, back, found);
+      near_triangles(fine, *coarse.triangles, at_coarse, least);
+  const double found = surface_distance(*fine.triangles, *coarse.triangles, there, least);
+  const std::vector<std::uint32_t> back = near_triangles(coarse, *fine.triangles, at_fine, least);
+  return surface_distance(*coarse.triangles, *fine.triangles, back, found);
 }
 
 /// Lengths on the surface that a unit of uv covers, of each material; 0 where it has no texture.
@@ -330,6 +334,7 @@ Measured decoded_surface(const ChunkedMesh& chunked, PositionKind kind,
     }
     for (const std::uint16_t i : chunk.indices) surface.indices.push_back(chunk.vertices[i]);
   }
+  surface.triangles.emplace(surface.positions, surface.indices);
   return surface;
 }
 
@@ -350,7 +355,7 @@ class StandInMaker {
       low_ = glm::min(low_, p);
       high_ = glm::max(high_, p);
     }
-    measured_.push_back(joined_.surface);
+    joined_.surface.triangles.emplace(joined_.surface.positions, joined_.surface.indices);
   }
 
   /// The next one, of at most so many triangles. False: there is no way to so few.
@@ -365,24 +370,25 @@ class StandInMaker {
     // What repeats is a material's.
     out.mesh.repeats = mesh_.repeats;
     Measured surface = decoded_surface(out.mesh, options_.positions, places);
-    const double least = measured_.back().error;
+    const TrianglesAt at(surface, collapser_, places_);
+    const double least = measured_.empty() ? joined_.surface.error : measured_.back().error;
     const auto exact = [&](const Measured& other) { return other.error <= kNegligible * least; };
-    auto from = std::find_if(measured_.rbegin(), measured_.rend(), exact);
-    const Measured& fine = from != measured_.rend() ? *from : measured_.front();
-    const double distance =
-        distance_both_ways(fine, surface, collapser_, places_, std::max(0.0, least - fine.error));
+    const auto from = std::find_if(measured_.rbegin(), measured_.rend(), exact);
+    Measured& fine = from != measured_.rend() ? *from : joined_.surface;
+    const double distance = distance_both_ways(fine, TrianglesAt(fine, collapser_, places_),
+                                               surface, at, std::max(0.0, least - fine.error));
     surface.error = out.error = std::max(least, fine.error + distance);
-    out.shading = std::max(joined_.shading, shading_of(surface, out.mesh.mesh));
+    out.shading = std::max(joined_.shading, shading_of(*surface.triangles, at, out.mesh.mesh));
+    // No coarser one is measured against those before.
+    measured_.erase(measured_.begin(), from.base() - (from != measured_.rend() ? 1 : 0));
     measured_.push_back(std::move(surface));
     collapser_.forget();
     return true;
   }
 
  private:
-  /// As ChunkLevel::shading.
-  double shading_of(const Measured& coarse, const TriMesh& mesh) {
-    const MeshSurface surface(coarse.positions, coarse.indices);
-    const TrianglesAt at(coarse, collapser_, places_);
+  /// As ChunkLevel::shading. mesh: what the surface is of.
+  double shading_of(const MeshSurface& surface, const TrianglesAt& at, const TriMesh& mesh) {
     std::vector<LookDifference> differences(points_.middles.size());
     for (std::size_t i = 0; i < differences.size(); ++i) {
       const std::size_t corner = 3 * std::size_t{points_.triangles[i]};
@@ -408,7 +414,7 @@ class StandInMaker {
   PixelCells cells_;
   glm::dvec3 low_;
   glm::dvec3 high_;
-  std::vector<Measured> measured_;  ///< finest first
+  std::vector<Measured> measured_;  ///< stand-ins, finest first
 };
 
 }  // namespace
