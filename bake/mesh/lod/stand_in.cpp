@@ -7,8 +7,7 @@
 #include <numeric>
 #include <optional>
 #include <span>
-#include <tuple>
-#include <unordered_map>
+#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -98,31 +97,43 @@ Joined join_chunks(const ChunkedMesh& mesh, PositionKind kind, std::uint32_t hal
   return joined;
 }
 
-/// Numbers for what is equal, in the order of first use.
-template <class Key, class Hash>
+/// Numbers for what is equal, in the order of first use: a hash table with open addressing.
+template <std::size_t kWords>
 class Numbers {
  public:
+  using Key = std::array<std::uint64_t, kWords>;
+
   /// The number of a key, and whether it is new.
   std::pair<std::uint32_t, bool> of(const Key& key) {
-    const auto [found, added] =
-        numbers_.try_emplace(key, static_cast<std::uint32_t>(numbers_.size()));
-    return {found->second, added};
+    if (2 * keys_.size() >= slots_.size()) grow();
+    std::uint32_t& slot = slot_of(key);
+    const bool added = slot == kNoIndex;
+    if (added) {
+      slot = static_cast<std::uint32_t>(keys_.size());
+      keys_.push_back(key);
+    }
+    return {slot, added};
   }
 
  private:
-  std::unordered_map<Key, std::uint32_t, Hash> numbers_;
-};
-
-struct HashWords {
-  template <std::size_t kSize>
-  std::size_t operator()(const std::array<std::uint64_t, kSize>& words) const {
+  /// Where the number of a key is, or comes.
+  std::uint32_t& slot_of(const Key& key) {
     std::uint64_t hash = 0;
-    for (const std::uint64_t word : words) {
+    for (const std::uint64_t word : key) {
       hash = (hash ^ word) * 0x9E3779B97F4A7C15u;
       hash ^= hash >> 32;
     }
-    return hash;
+    std::size_t at = hash & (slots_.size() - 1);
+    while (slots_[at] != kNoIndex && keys_[slots_[at]] != key) at = (at + 1) & (slots_.size() - 1);
+    return slots_[at];
   }
+  void grow() {
+    slots_.assign(std::max<std::size_t>(64, 2 * slots_.size()), kNoIndex);
+    for (std::uint32_t i = 0; i < keys_.size(); ++i) slot_of(keys_[i]) = i;
+  }
+
+  std::vector<Key> keys_;             // by number
+  std::vector<std::uint32_t> slots_;  // a power of two, at most half of them taken
 };
 
 std::uint64_t bits_of(double value) {
@@ -132,9 +143,9 @@ std::uint64_t bits_of(double value) {
 /// What collapses see of the joined levels. Sets the places of the surface's vertices.
 CollapseMesh collapse_mesh(const TriMesh& mesh, Joined& joined) {
   CollapseMesh out;
-  Numbers<std::array<std::uint64_t, 3>, HashWords> places;
-  Numbers<std::array<std::uint64_t, 5>, HashWords> looks;
-  Numbers<std::array<std::uint64_t, 4>, HashWords> shades;
+  Numbers<3> places;
+  Numbers<5> looks;
+  Numbers<4> shades;
   Measured& surface = joined.surface;
   for (const glm::dvec3& p : surface.positions) {
     const auto [place, added] = places.of({bits_of(p.x), bits_of(p.y), bits_of(p.z)});
@@ -165,14 +176,26 @@ CollapseMesh collapse_mesh(const TriMesh& mesh, Joined& joined) {
     if (added) out.shades.push_back(shade);
     return number;
   };
+  struct Known {
+    std::uint32_t material = kNoIndex;
+    std::uint32_t look = kNoIndex;
+    std::uint32_t shade = kNoIndex;
+  };
+  std::vector<Known> known(surface.positions.size());  // of each vertex: what it had last
   for (std::size_t i = 0; i < surface.indices.size(); i += 3) {
     CollapseFace face;
     face.material = joined.materials[i / 3];
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t vertex = surface.indices[i + k];
       face.places[k] = surface.places[vertex];
-      face.looks[k] = look_of(face.places[k], joined.vertices[vertex], face.material);
-      face.shades[k] = shade_of(face.places[k], joined.vertices[vertex]);
+      Known& at = known[vertex];
+      if (at.look == kNoIndex || at.material != face.material) {
+        const std::uint32_t v = joined.vertices[vertex];
+        at = {face.material, look_of(face.places[k], v, face.material),
+              shade_of(face.places[k], v)};
+      }
+      face.looks[k] = at.look;
+      face.shades[k] = at.shade;
     }
     const auto& p = face.places;
     if (p[0] != p[1] && p[1] != p[2] && p[2] != p[0]) out.faces.push_back(face);
@@ -194,7 +217,7 @@ TriMesh mesh_of(const TriMesh& source, const MeshCollapser& collapser, const glm
   mesh.source_min = source.source_min;
   mesh.source_max = source.source_max;
   mesh.materials = source.materials;
-  Numbers<std::array<std::uint64_t, 2>, HashWords> vertices;
+  Numbers<2> vertices;
   const CollapseMesh& all = collapser.mesh();
   for (const CollapseFace& face : collapser.faces()) {
     std::array<std::uint32_t, 3> triangle{};
