@@ -70,6 +70,8 @@ void MeshCollapser::link_faces() {
 void MeshCollapser::forget() {
   queue_ = {};
   std::fill(quadrics_.begin(), quadrics_.end(), Quadric());
+  std::vector<std::uint8_t> open(mesh_.places.size());
+  for (std::uint32_t place = 0; place < open.size(); ++place) open[place] = is_open(place) ? 1 : 0;
   for (std::uint32_t f = 0; f < mesh_.faces.size(); ++f) {
     if (alive_[f] == 0) continue;
     const std::array<glm::dvec3, 3> t = corners_of(mesh_, mesh_.faces[f]);
@@ -79,8 +81,27 @@ void MeshCollapser::forget() {
       const Quadric plane = Quadric::of_plane(cross / twice, t[0], 0.5 * twice);
       for (const std::uint32_t place : mesh_.faces[f].places) quadrics_[place] += plane;
     }
-    for (std::uint32_t k = 0; k < 3; ++k) add_border(f, k);
+    const std::array<std::uint32_t, 3>& at = mesh_.faces[f].places;
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      if (open[at[k]] != 0 && open[at[(k + 1) % 3]] != 0) add_border(f, k);
+    }
   }
+}
+
+/// Is some edge at a place one of a single triangle?
+bool MeshCollapser::is_open(std::uint32_t place) {
+  // Marks of what is beside the place: mark_ - 1 in one triangle, mark_ in several.
+  mark_ += 2;
+  int single = 0;
+  around(place, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) {
+    for (const std::uint32_t other : {a, b}) {
+      std::uint32_t& mark = marks_[other];
+      if (mark == mark_) continue;
+      single += mark == mark_ - 1 ? -1 : 1;
+      mark = mark == mark_ - 1 ? mark_ : mark_ - 1;
+    }
+  });
+  return single > 0;
 }
 
 /// A plane through an edge of one triangle, across it.

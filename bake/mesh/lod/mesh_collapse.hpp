@@ -90,6 +90,7 @@ class MeshCollapser {
   template <class Callback>
   void around(std::uint32_t place, const Callback& callback);
   void link_faces();
+  bool is_open(std::uint32_t place);
   void add_border(std::uint32_t f, std::uint32_t k);
   void fill_queue();
   void push(std::uint32_t a, std::uint32_t b);
