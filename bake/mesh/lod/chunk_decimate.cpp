@@ -277,7 +277,8 @@ class Decimator {
         continue;
       }
       const Triangle& triangle = triangles_[t];
-      callback(t, triangle[(corner + 1) % 3], triangle[(corner + 2) % 3]);
+      const std::array<std::uint32_t, 2>& others = kOtherCorners[corner - 3 * t];
+      callback(t, triangle[others[0]], triangle[others[1]]);
       link = &next_[corner];
     }
   }

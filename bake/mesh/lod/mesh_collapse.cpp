@@ -136,7 +136,8 @@ void MeshCollapser::around(std::uint32_t place, const Callback& callback) {
       continue;
     }
     const auto& places = mesh_.faces[f].places;
-    callback(f, places[(corner + 1) % 3], places[(corner + 2) % 3]);
+    const std::array<std::uint32_t, 2>& others = kOtherCorners[corner - 3 * f];
+    callback(f, places[others[0]], places[others[1]]);
     link = &next_[corner];
   }
 }
