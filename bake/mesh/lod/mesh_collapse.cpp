@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <tuple>
+#include <utility>
 
 #include <glm/geometric.hpp>
 
@@ -33,10 +33,6 @@ std::uint32_t root_of(std::vector<std::pair<std::uint32_t, std::uint32_t>>& join
 }
 
 }  // namespace
-
-bool MeshCollapser::Candidate::operator<(const Candidate& other) const {
-  return std::tie(price, to, from) > std::tie(other.price, other.to, other.from);
-}
 
 MeshCollapser::MeshCollapser(CollapseMesh mesh)
     : mesh_(std::move(mesh)),
@@ -325,27 +321,32 @@ double MeshCollapser::slide_at(const glm::dvec3& point) {
   return sum;
 }
 
+/// Has a place a triangle without another one?
+bool MeshCollapser::has_more(std::uint32_t place, std::uint32_t other) const {
+  for (std::uint32_t corner = first_[place]; corner != kNoIndex; corner = next_[corner]) {
+    if (alive_[corner / 3] == 0) continue;
+    const std::array<std::uint32_t, 3>& at = mesh_.faces[corner / 3].places;
+    if (at[0] != other && at[1] != other && at[2] != other) return true;
+  }
+  return false;
+}
+
 /// What it costs that a piece of one or two triangles goes as a whole, as all of it is at one edge:
 /// it is off by its length. 0: there is more.
 float MeshCollapser::loss_of(std::uint32_t a, std::uint32_t b) {
+  if (has_more(a, b) || has_more(b, a)) return 0.0f;
   double area = 0;
   double square = 0;
-  bool more = false;
-  for (const std::uint32_t place : {a, b}) {
-    around(place, [&](std::uint32_t f, std::uint32_t c, std::uint32_t d) {
-      const std::uint32_t other = place == a ? b : a;
-      more = more || (c != other && d != other);
-      if (more || place == b) return;
-      const std::array<glm::dvec3, 3> t = corners_of(mesh_, mesh_.faces[f]);
-      area += 0.5 * glm::length(glm::cross(t[1] - t[0], t[2] - t[0]));
-      for (std::size_t k = 0; k < 3; ++k) {
-        const glm::dvec3 side = t[(k + 1) % 3] - t[k];
-        square = std::max(square, glm::dot(side, side));
-      }
-    });
-  }
+  around(a, [&](std::uint32_t f, std::uint32_t, std::uint32_t) {
+    const std::array<glm::dvec3, 3> t = corners_of(mesh_, mesh_.faces[f]);
+    area += 0.5 * glm::length(glm::cross(t[1] - t[0], t[2] - t[0]));
+    for (std::size_t k = 0; k < 3; ++k) {
+      const glm::dvec3 side = t[(k + 1) % 3] - t[k];
+      square = std::max(square, glm::dot(side, side));
+    }
+  });
   constexpr float kLeast = std::numeric_limits<float>::min();
-  return more ? 0.0f : std::max(kLeast, static_cast<float>(std::sqrt(area) * square));
+  return std::max(kLeast, static_cast<float>(std::sqrt(area) * square));
 }
 
 void MeshCollapser::drop(std::uint32_t place) {
@@ -393,8 +394,7 @@ bool MeshCollapser::turns(std::uint32_t a, std::uint32_t b, const glm::dvec3& po
 
 void MeshCollapser::collapse(std::uint32_t to, std::uint32_t from, const glm::dvec3& point) {
   collect(to, from);
-  carry_looks(point);
-  carry_shades(point);
+  carry_corners(point);
   for (const NearFace& near : near_) {
     CollapseFace& face = mesh_.faces[near.face];
     if (near.at[0] + near.at[1] + near.at[2] > 1) {
@@ -422,10 +422,8 @@ void MeshCollapser::collapse(std::uint32_t to, std::uint32_t from, const glm::dv
   push_around(to);
 }
 
-namespace {
-
 /// The nearest point of some triangles, and which one it is on.
-struct Nearest {
+struct MeshCollapser::Nearest {
   ClosestPoint closest{std::numeric_limits<double>::infinity(), 0, 0};
   const CollapseFace* face = nullptr;
 
@@ -438,21 +436,35 @@ struct Nearest {
   }
 };
 
-}  // namespace
-
-void MeshCollapser::carry_looks(const glm::dvec3& point) {
-  std::vector<std::pair<std::uint32_t, CornerLook>> made;
-  for (const auto& [look, root] : looks_) {
-    if (look != root) continue;
+/// Calls back with each look, or shade, that stays, and the nearest point to go on to: of the
+/// triangles of collect() that have it. all: the nearest of all of them.
+template <class Callback>
+void MeshCollapser::carry(const glm::dvec3& point,
+                          std::array<std::uint32_t, 3> CollapseFace::*member, Joined& joined,
+                          const Nearest& all, const Callback& callback) {
+  const auto stays = [](const auto& each) { return each.first == each.second; };
+  // All triangles have the only one.
+  const bool only = std::count_if(joined.begin(), joined.end(), stays) == 1;
+  for (const auto& [id, root] : joined) {
+    if (id != root) continue;
     Nearest nearest;
     for (const NearFace& near : near_) {
+      if (only) break;
       const CollapseFace& face = mesh_.faces[near.face];
       bool has = false;
       for (std::size_t k = 0; k < 3; ++k) {
-        has = has || (near.at[k] && root_of(looks_, face.looks[k]) == root);
+        has = has || (near.at[k] && root_of(joined, (face.*member)[k]) == root);
       }
       if (has) nearest.consider(mesh_, face, point);
     }
+    callback(root, only ? all : nearest);
+  }
+}
+
+void MeshCollapser::carry_corners(const glm::dvec3& point) {
+  Nearest all;
+  for (const NearFace& near : near_) all.consider(mesh_, mesh_.faces[near.face], point);
+  carry(point, &CollapseFace::looks, looks_, all, [&](std::uint32_t root, const Nearest& nearest) {
     CornerLook sum;
     const std::array<double, 3> weights = nearest.weights();
     for (std::size_t k = 0; k < 3; ++k) {
@@ -460,36 +472,21 @@ void MeshCollapser::carry_looks(const glm::dvec3& point) {
       sum.uv += weights[k] * corner.uv;
       sum.colour += static_cast<float>(weights[k]) * corner.colour;
     }
-    made.emplace_back(root, sum);
-  }
-  for (const auto& [root, look] : made) mesh_.looks[root] = look;
-}
-
-void MeshCollapser::carry_shades(const glm::dvec3& point) {
-  std::vector<std::pair<std::uint32_t, CornerShade>> made;
-  for (const auto& [shade, root] : shades_) {
-    if (shade != root) continue;
-    Nearest nearest;
-    for (const NearFace& near : near_) {
-      const CollapseFace& face = mesh_.faces[near.face];
-      bool has = false;
-      for (std::size_t k = 0; k < 3; ++k) {
-        has = has || (near.at[k] && root_of(shades_, face.shades[k]) == root);
-      }
-      if (has) nearest.consider(mesh_, face, point);
-    }
-    CornerShade sum;
-    const std::array<double, 3> weights = nearest.weights();
-    for (std::size_t k = 0; k < 3; ++k) {
-      const CornerShade& corner = mesh_.shades[nearest.face->shades[k]];
-      sum.normal += static_cast<float>(weights[k]) * corner.normal;
-      sum.occlusion += static_cast<float>(weights[k]) * corner.occlusion;
-    }
-    const float length = glm::length(sum.normal);
-    sum.normal = length > 0 ? sum.normal / length : mesh_.shades[root].normal;
-    made.emplace_back(root, sum);
-  }
-  for (const auto& [root, shade] : made) mesh_.shades[root] = shade;
+    mesh_.looks[root] = sum;
+  });
+  carry(point, &CollapseFace::shades, shades_, all,
+        [&](std::uint32_t root, const Nearest& nearest) {
+          CornerShade sum;
+          const std::array<double, 3> weights = nearest.weights();
+          for (std::size_t k = 0; k < 3; ++k) {
+            const CornerShade& corner = mesh_.shades[nearest.face->shades[k]];
+            sum.normal += static_cast<float>(weights[k]) * corner.normal;
+            sum.occlusion += static_cast<float>(weights[k]) * corner.occlusion;
+          }
+          const float length = glm::length(sum.normal);
+          sum.normal = length > 0 ? sum.normal / length : mesh_.shades[root].normal;
+          mesh_.shades[root] = sum;
+        });
 }
 
 }  // namespace modar

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <queue>
@@ -77,7 +78,13 @@ class MeshCollapser {
     std::uint32_t from = 0;
     std::uint32_t to_version = 0;
     std::uint32_t from_version = 0;
-    bool operator<(const Candidate& other) const;  ///< dearer first, as a heap has it
+    /// Dearer first, as a heap has it. Prices are no less than zero: in the order of their bits.
+    bool operator<(const Candidate& other) const {
+      return key() > other.key() || (key() == other.key() && from > other.from);
+    }
+    [[nodiscard]] std::uint64_t key() const {
+      return std::uint64_t{std::bit_cast<std::uint32_t>(price)} << 32 | to;
+    }
   };
   /// Where two ends go, and at which price.
   struct Target {
@@ -98,6 +105,7 @@ class MeshCollapser {
   [[nodiscard]] Target target_of(std::uint32_t a, std::uint32_t b);
   double slide_at(const glm::dvec3& point);
   bool has_several_looks(std::uint32_t place);
+  bool has_more(std::uint32_t place, std::uint32_t other) const;
   float loss_of(std::uint32_t a, std::uint32_t b);
   void drop(std::uint32_t place);
   bool folds(std::uint32_t a, std::uint32_t b);
@@ -105,8 +113,11 @@ class MeshCollapser {
   void collapse(std::uint32_t to, std::uint32_t from, const glm::dvec3& point);
   void collect(std::uint32_t a, std::uint32_t b);
   void join(std::array<std::uint32_t, 3> CollapseFace::*member, Joined& joined);
-  void carry_looks(const glm::dvec3& point);
-  void carry_shades(const glm::dvec3& point);
+  void carry_corners(const glm::dvec3& point);
+  struct Nearest;
+  template <class Callback>
+  void carry(const glm::dvec3& point, std::array<std::uint32_t, 3> CollapseFace::*member,
+             Joined& joined, const Nearest& all, const Callback& callback);
 
   /// A triangle at one of two places, and which of its corners are there.
   struct NearFace {
