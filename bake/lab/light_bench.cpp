@@ -16,6 +16,7 @@
 #include "bake/check/picture/reference_renderer.hpp"
 #include "bake/check/picture/visual_check.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/io/output.hpp"
 #include "bake/lab/bench_parts.hpp"
 #include "bake/lab/path_tracer.hpp"
 #include "bake/lab/render_bench.hpp"
@@ -377,6 +378,7 @@ double ciede2000(const glm::dvec3& a, const glm::dvec3& b) {
 }
 
 Result<std::vector<BenchRow>> bench_light(const LightBenchOptions& options) {
+  if (!options.folder.empty()) MODAR_TRY(make_output_folder(options.folder));
   const TemporaryFolder folder;
   std::vector<Subject> subjects;
   for (const std::string& argument : options.models) subjects.push_back(subject_of(argument));
