@@ -550,7 +550,8 @@ PatchFit linearise(const TrackedPattern& pattern, const FrameView& frame, const 
 
 /// Tukey's weight by the displacement that a patch still asks for after a step of the pose: a patch
 /// on the edge of an occluder correlates well, but points elsewhere. It loses its weight at 1.2
-/// template pixels, beyond what noise does; set by hand.
+/// template pixels, beyond what noise does. On `modar-lab bench wild` 0.6, 1.2 and 2.4 give a 95th
+/// percentile of 2.38, 2.38 and 2.37 pixels.
 double robust_weight(const PatchLinearisation& patch, const Vector6& change) {
   constexpr float kFar = 1.2f;
   double x = 0;

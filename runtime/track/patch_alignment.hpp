@@ -24,7 +24,8 @@ namespace modar::tracker {
 inline constexpr std::size_t kMaxPatches = 256;
 
 /// Correlation from which a patch counts as an inlier. Blur and noise lower it for every patch,
-/// chance agreement of edges reaches 0.5; set by hand between the two.
+/// chance agreement of edges reaches 0.5. On `modar-lab bench wild` nothing changes from 0.35 to
+/// 0.84; at 0.98, 1 % of the frames is lost.
 inline constexpr float kInlierCorrelation = 0.7f;
 /// Correlation from which a patch looks closely like its template, and how many of those speak for
 /// a place by themselves: the most that chance brought in 600 cluttered frames were 7.
