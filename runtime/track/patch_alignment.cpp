@@ -101,7 +101,7 @@ bool cut_patch(const GrayImage& image, int column, int row, Patch& patch) {
   return true;
 }
 
-PatchCache::PatchCache() {
+[[gnu::cold]] PatchCache::PatchCache() {
   scratch_.reserve(kMaxPatches);
   linearisations_.reserve(kMaxPatches);
   for (Slot& slot : slots_) slot.patches.reserve(kMaxPatches);

@@ -355,7 +355,7 @@ bool MapPoint::usable() const {
   return steady() || (!of_pattern && hits >= kUsableHits && travel >= kSteadyTravel);
 }
 
-Surroundings::Surroundings(const Camera& camera) : camera_(camera) {
+[[gnu::cold]] Surroundings::Surroundings(const Camera& camera) : camera_(camera) {
   while ((camera.width >> level_) > kMaxWidth) ++level_;
   coarse_ = level_ + kCoarser;
   points_.reserve(kMaxPoints);

@@ -28,7 +28,7 @@ namespace modar {
 namespace {
 
 /// What relief changes of a stored colour at most. More is nearer to what a shader would draw in
-/// the neutral room, and shows more where the light comes from elsewhere. Set by hand.
+/// the neutral room, and is more wrong where the light comes from elsewhere: not swept.
 constexpr float kMostRelief = 0.3F;
 /// Repeats of a picture over all triangles that are looked at: tiles beyond are left out evenly.
 /// More take time; fewer make the mean over the places that share a texel depend on the choice.
@@ -366,8 +366,8 @@ class ReliefRows {
   FactorSums& sums_;
 };
 
-/// White stands so many texels above black where an MTL file's bump map states no factor: usual
-/// converters of heights to normals count so, as no format says in which unit heights are.
+/// White stands so many texels above black where an MTL file's bump map states no factor: a
+/// convention of this bake, as no format says in which unit heights are.
 constexpr float kHeightTexels = 4;
 
 /// Heights are grey; most texels of a normal map look straight on, which is blue.
