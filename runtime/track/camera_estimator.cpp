@@ -69,7 +69,7 @@ double apart(const Outline& a, const Outline& b) {
 
 }  // namespace
 
-CameraEstimator::CameraEstimator(const Camera& camera, std::size_t patterns)
+[[gnu::cold]] CameraEstimator::CameraEstimator(const Camera& camera, std::size_t patterns)
     : camera_(camera),
       start_(camera.fx),
       sigma_(kPlaceSigma / 640.0 * std::max(camera.width, camera.height)),

@@ -36,7 +36,7 @@ constexpr double kFading = 0.99;
 
 }  // namespace
 
-FrameTracker::FrameTracker(const Camera& camera, const DetectOptions& options)
+[[gnu::cold]] FrameTracker::FrameTracker(const Camera& camera, const DetectOptions& options)
     : camera_(camera),
       kernels_(kernels(options.simd)),
       extractor_(FeatureExtractor::create(camera.width, camera.height, options)) {}

@@ -118,8 +118,8 @@ bool agrees(const FeatureMatch& hypothesis, const FeatureMatch& other) {
   return alike(a, other.affine);
 }
 
-PlaneMatcher::PlaneMatcher(const Camera& camera, const Kernels& kernels, std::size_t max_features,
-                           std::size_t max_codes)
+[[gnu::cold]] PlaneMatcher::PlaneMatcher(const Camera& camera, const Kernels& kernels,
+                                         std::size_t max_features, std::size_t max_codes)
     : camera_(camera), kernels_(kernels), distances_(max_codes + kSlack) {
   for (HomographyHypothesis& one : hypotheses_) one.mask.reserve(max_features);
   matches_.reserve(max_features);
@@ -163,15 +163,17 @@ bool PlaneMatcher::unambiguous(const TrackedPattern& pattern, std::size_t first,
 }
 
 bool PlaneMatcher::match(const TrackedPattern& pattern, std::span<const TrackerFeature> features,
-                         std::size_t end, std::size_t& next, std::int64_t& work) {
+                         std::size_t count, std::size_t end, std::size_t& next,
+                         std::int64_t& work) {
   constexpr std::int64_t kCodeCost = 10;  // instructions, as scripts/foreign.sh counts them
   constexpr std::int64_t kFeatureCost = 1000;
   if (next == 0) matches_.clear();
   const Camera* lens = camera_.distortion == std::array<double, 5>{} ? nullptr : &camera_;
-  const std::size_t half = (features.size() + 1) / 2;
+  const std::size_t half = (count + 1) / 2;
   for (; next < end; ++next) {
     if (work <= 0) return false;
-    const TrackerFeature& feature = features[next < half ? 2 * next : 2 * (next - half) + 1];
+    const std::size_t in_order = next < half ? 2 * next : 2 * (next - half) + 1;
+    const TrackerFeature& feature = features[next < count ? in_order : next];
     const std::size_t first = feature.dark != 0 ? pattern.bright_count : 0;
     const std::size_t last = feature.dark != 0 ? pattern.features.size() : pattern.bright_count;
     if (first == last) continue;
@@ -356,7 +358,7 @@ std::span<const HomographyHypothesis> PlaneMatcher::find(const TrackedPattern& p
                                                          std::span<const TrackerFeature> features) {
   std::size_t next = 0;
   std::int64_t work = std::numeric_limits<std::int64_t>::max();
-  match(pattern, features, features.size(), next, work);
+  match(pattern, features, features.size(), features.size(), next, work);
   return hypotheses();
 }
 
@@ -472,8 +474,8 @@ std::array<std::size_t, 2> range_of(const TrackedPattern& pattern, bool dark) {
 
 }  // namespace
 
-CodeIndex::CodeIndex(std::span<const TrackedPattern> patterns, const Kernels& kernels,
-                     std::size_t max_features)
+[[gnu::cold]] CodeIndex::CodeIndex(std::span<const TrackedPattern> patterns, const Kernels& kernels,
+                                   std::size_t max_features)
     : patterns_(patterns),
       kernels_(kernels),
       votes_(max_features),
@@ -511,7 +513,7 @@ bool CodeIndex::build(std::int64_t& work) {
 }
 
 /// A group's codes and words.
-void CodeIndex::collect(Group& group, bool dark) {
+[[gnu::cold]] void CodeIndex::collect(Group& group, bool dark) {
   owners_.clear();
   for (std::uint32_t p = 0; p < patterns_.size(); ++p) {
     const auto [first, last] = range_of(patterns_[p], dark);
@@ -533,7 +535,7 @@ void CodeIndex::collect(Group& group, bool dark) {
 }
 
 /// Fills a group's lists: whole blocks, padded with the last code.
-void CodeIndex::sort_into_words(Group& group) {
+[[gnu::cold]] void CodeIndex::sort_into_words(Group& group) {
   const std::size_t words = group.words.size() / kCodeBytes;
   std::vector<std::uint32_t> ends(words);  // of a word's codes so far; at first their number
   for (const std::uint32_t word : nearest_) ++ends[word];

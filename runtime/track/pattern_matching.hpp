@@ -55,11 +55,11 @@ class PlaneMatcher {
   std::span<const HomographyHypothesis> find(const TrackedPattern& pattern,
                                              std::span<const TrackerFeature> features);
   /// The same in slices: match() with `next` 0 at first until it returns true, then hypotheses().
-  /// Every second feature comes first, and `end` counts in that order; after hypotheses() match()
-  /// may go on to a greater one. work: about how many ARMv7 instructions match() may take; it
-  /// subtracts what it took.
+  /// Of the first `count` features every second comes first, and `end` counts in that order; after
+  /// hypotheses() match() may go on to a greater one. work: about how many ARMv7 instructions
+  /// match() may take; it subtracts what it took.
   bool match(const TrackedPattern& pattern, std::span<const TrackerFeature> features,
-             std::size_t end, std::size_t& next, std::int64_t& work);
+             std::size_t count, std::size_t end, std::size_t& next, std::int64_t& work);
   std::span<const HomographyHypothesis> hypotheses();
   [[nodiscard]] std::size_t max_features() const { return matches_.capacity(); }
   /// Matches of the last find().

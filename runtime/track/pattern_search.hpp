@@ -79,6 +79,8 @@ class PatternSearch {
     kRefine,
     kMap
   };
+  /// The features that are matched: every second of the frame's, all, the spare ones as well.
+  enum class Features : std::uint8_t { kHalf, kAll, kSpare };
   bool step(std::int64_t& work);
   bool take_features(std::int64_t& work);
   void match_features(const TrackedPattern& pattern, std::int64_t& work);
@@ -138,7 +140,7 @@ class PatternSearch {
   std::size_t at_ = 0;            ///< of selected_
   bool found_ = false;            ///< one of them
   std::size_t next_feature_ = 0;  ///< to match
-  bool all_features_ = false;     ///< else every second
+  Features features_ = Features::kHalf;
   std::span<const HomographyHypothesis> hypotheses_;
   std::size_t hypothesis_ = 0;
   std::size_t best_hypothesis_ = 0;  ///< whose pose is best_

@@ -68,12 +68,13 @@ struct PoseLoop::State {
   bool switch_pattern(std::size_t from, std::size_t to, Detection& detection);
 };
 
-PoseLoop::PoseLoop(std::unique_ptr<State> state) : state_(std::move(state)) {}
+[[gnu::cold]] PoseLoop::PoseLoop(std::unique_ptr<State> state) : state_(std::move(state)) {}
 PoseLoop::~PoseLoop() = default;
 
-Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle, const Camera& camera,
-                                                   const PoseLoopOptions& options,
-                                                   std::span<const OwnRecord> own) {
+[[gnu::cold]] Result<std::unique_ptr<PoseLoop>> PoseLoop::create(const BundleView& bundle,
+                                                                 const Camera& camera,
+                                                                 const PoseLoopOptions& options,
+                                                                 std::span<const OwnRecord> own) {
   if (camera.width < 1 || camera.height < 1 || camera.width > 16384 || camera.height > 16384) {
     return fail(ExitCode::kInvalidInput, "tracker.frame-size", "", "the camera has no frame size",
                 "give a camera of 1 to 16384 pixels a side");

@@ -28,7 +28,7 @@ double blend(double seconds, double constant) {
 
 }  // namespace
 
-PoseSmoother::PoseSmoother(std::size_t pattern_count, double max_latency_ms)
+[[gnu::cold]] PoseSmoother::PoseSmoother(std::size_t pattern_count, double max_latency_ms)
     : states_(pattern_count), max_latency_s_(std::clamp(max_latency_ms, 0.0, 1000.0) * 1e-3) {}
 
 /// Returns the latency in seconds.

@@ -71,7 +71,8 @@ glm::vec3 direction_of(const Pose& pose) {
 
 }  // namespace
 
-PrintVerifier::PrintVerifier(std::span<const TrackedPattern> patterns, bool known_camera)
+[[gnu::cold]] PrintVerifier::PrintVerifier(std::span<const TrackedPattern> patterns,
+                                           bool known_camera)
     : patterns_(patterns),
       known_camera_(known_camera),
       evidence_(patterns.size()),

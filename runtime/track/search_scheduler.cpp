@@ -13,8 +13,9 @@ constexpr int kVerifyingBudget = 20;
 
 }  // namespace
 
-SearchScheduler::SearchScheduler(const Camera& camera, std::span<const TrackedPattern> patterns,
-                                 const PoseLoopOptions& options)
+[[gnu::cold]] SearchScheduler::SearchScheduler(const Camera& camera,
+                                               std::span<const TrackedPattern> patterns,
+                                               const PoseLoopOptions& options)
     : options_(options), camera_(camera), patterns_(patterns.begin(), patterns.end()) {
   priorities_.resize(patterns_.size());
   candidates_.patterns.resize(patterns_.size());

@@ -59,8 +59,9 @@ glm::dvec3 TrackedPattern::on_surface(glm::dvec2 pixel) const {
   return {at[0], at[1], at[2]};
 }
 
-Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes, std::uint32_t index,
-                                            std::span<const std::byte> shape) {
+[[gnu::cold]] Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes,
+                                                          std::uint32_t index,
+                                                          std::span<const std::byte> shape) {
   std::uint32_t version = 0;
   if (bytes.size() >= sizeof version) std::memcpy(&version, bytes.data(), sizeof version);
   if (bytes.size() >= sizeof(TrackerRecordHeader) && version != kFeatureExtractorVersion) {

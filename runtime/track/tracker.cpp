@@ -58,7 +58,7 @@ constexpr int kFramesToKeep = 2;
 
 }  // namespace
 
-Hysteresis::Hysteresis(std::size_t pattern_count, bool predict)
+[[gnu::cold]] Hysteresis::Hysteresis(std::size_t pattern_count, bool predict)
     : counters_(pattern_count), states_(pattern_count), predict_(predict) {}
 
 std::span<const Hysteresis::State> Hysteresis::step(std::span<const Detection> visible) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "kernels.hpp"
@@ -20,9 +21,10 @@ struct Corner {
   std::uint8_t cell = 0;  ///< a number that the cells before and after do not have
 };
 
-/// FAST-9 corners of one pyramid level with 3x3 suppression, the strongest few of each cell: Rosten
-/// & Drummond, "Machine learning for high-speed corner detection" (2006), with the score of its
-/// later implementation, the greatest threshold. Holds buffers for levels up to a width.
+/// FAST-9 corners of one pyramid level with 3x3 suppression, the strongest few of each cell and as
+/// many spare ones, the next: Rosten & Drummond, "Machine learning for high-speed corner detection"
+/// (2006), with the score of its later implementation, the greatest threshold. Holds buffers for
+/// levels up to a width.
 class CornerFinder {
  public:
   CornerFinder(int width, const DetectOptions& options);
@@ -30,62 +32,77 @@ class CornerFinder {
   /// next; false once there are no more. Corners are ordered by rows of cells, never beyond the
   /// reserved capacity.
   bool find(const GrayImage& image, std::uint8_t level, int threshold, int rows, int& row,
-            std::vector<Corner>& corners);
+            std::vector<Corner>& corners, std::vector<Corner>& spare);
 
  private:
-  void keep(const Corner& corner, int cell);
-  void flush(std::vector<Corner>& corners);
+  [[nodiscard]] int weakest(const Corner* slots) const;
+  void keep(Corner corner, int cell);
+  void flush(std::vector<Corner>& corners, std::vector<Corner>& spare);
 
   DetectOptions options_;
   int pitch_ = 0;
-  std::vector<std::uint8_t> rows_;  ///< three rows of scores, three of bright scores, peaks
-  std::vector<Corner> cells_;       ///< per_cell slots a cell of the current cell row
-  std::vector<int> counts_;
+  std::vector<std::uint8_t> rows_;      ///< three rows of scores, three of bright scores, peaks
+  std::vector<Corner> cells_;           ///< twice per_cell slots a cell of the current cell row
+  std::vector<int> counts_;             ///< two a cell: of the strongest, and of the spare ones
+  std::vector<int> weakest_;            ///< the same: the weakest, where there are per_cell
   std::vector<std::uint16_t> cell_of_;  ///< of a column: old phones have no division
   std::uint8_t cell_ = 0;               ///< of the corners flushed last
 };
 
-CornerFinder::CornerFinder(int width, const DetectOptions& options)
+[[gnu::cold]] CornerFinder::CornerFinder(int width, const DetectOptions& options)
     : options_(options),
       pitch_(width + 2 * kSlack),
       rows_(static_cast<std::size_t>(pitch_) * 7),
-      cells_(static_cast<std::size_t>((width / options.cell + 1) * options.per_cell)),
-      counts_(static_cast<std::size_t>(width / options.cell + 1)) {
+      cells_(static_cast<std::size_t>((width / options.cell + 1) * 2 * options.per_cell)),
+      counts_(static_cast<std::size_t>(width / options.cell + 1) * 2),
+      weakest_(counts_.size()) {
   for (int x = 0; x < width; ++x) {
     cell_of_.push_back(static_cast<std::uint16_t>(x / options.cell));
   }
 }
 
-void CornerFinder::keep(const Corner& corner, int cell) {
-  Corner* slots = cells_.data() + cell * options_.per_cell;
-  int& count = counts_[static_cast<std::size_t>(cell)];
-  if (count < options_.per_cell) {
-    slots[count++] = corner;
-    return;
+/// The weakest corner; of equally weak ones the last, so that ties go by row.
+int CornerFinder::weakest(const Corner* slots) const {
+  int at = 0;
+  for (int i = 1; i < options_.per_cell; ++i) {
+    if (slots[i].score <= slots[at].score) at = i;
   }
-  // The weakest is dropped; of equally weak ones the last, so that ties go by row.
-  int weakest = 0;
-  for (int i = 1; i < count; ++i) {
-    if (slots[i].score <= slots[weakest].score) weakest = i;
-  }
-  if (corner.score > slots[weakest].score) slots[weakest] = corner;
+  return at;
 }
 
-void CornerFinder::flush(std::vector<Corner>& corners) {
-  for (std::size_t cell = 0; cell < counts_.size(); ++cell) {
-    if (counts_[cell] == 0) continue;
-    ++cell_;
-    Corner* slots = cells_.data() + cell * static_cast<std::size_t>(options_.per_cell);
-    for (int i = 0; i < counts_[cell]; ++i) {
-      slots[i].cell = cell_;
-      if (corners.size() < corners.capacity()) corners.push_back(slots[i]);
+/// Keeps a corner among a cell's strongest; what is weaker than these, among its spare ones.
+void CornerFinder::keep(Corner corner, int cell) {
+  for (std::size_t list = 2 * static_cast<std::size_t>(cell);
+       list / 2 == static_cast<std::size_t>(cell); ++list) {
+    Corner* slots = cells_.data() + list * static_cast<std::size_t>(options_.per_cell);
+    int& count = counts_[list];
+    int& last = weakest_[list];
+    if (count < options_.per_cell) {
+      slots[count++] = corner;
+      if (count == options_.per_cell) last = weakest(slots);
+      return;
     }
-    counts_[cell] = 0;
+    if (corner.score <= slots[last].score) continue;
+    std::swap(corner, slots[last]);
+    last = weakest(slots);
+  }
+}
+
+void CornerFinder::flush(std::vector<Corner>& corners, std::vector<Corner>& spare) {
+  for (std::size_t slot = 0; slot < counts_.size(); ++slot) {
+    const int count = std::exchange(counts_[slot], 0);
+    std::vector<Corner>& out = slot % 2 == 0 ? corners : spare;
+    if (slot % 2 == 0 && count > 0) ++cell_;
+    Corner* slots = cells_.data() + slot * static_cast<std::size_t>(options_.per_cell);
+    for (int i = 0; i < count; ++i) {
+      slots[i].cell = cell_;
+      if (out.size() < out.capacity()) out.push_back(slots[i]);
+    }
   }
 }
 
 bool CornerFinder::find(const GrayImage& image, std::uint8_t level, int threshold, int rows,
-                        int& row, std::vector<Corner>& corners) {
+                        int& row, std::vector<Corner>& corners, std::vector<Corner>& spare) {
   const int count = image.width - 2 * kTrackerBorder;
   if (count <= 0 || image.height <= 2 * kTrackerBorder) return false;
   const Kernels& run = kernels(options_.simd);
@@ -130,7 +147,7 @@ bool CornerFinder::find(const GrayImage& image, std::uint8_t level, int threshol
              cell_of_[static_cast<std::size_t>(column)]);
       }
     }
-    if (y == last || (centre + 1) / options_.cell != cell_row) flush(corners);
+    if (y == last || (centre + 1) / options_.cell != cell_row) flush(corners, spare);
   }
   row = end;
   return end <= last;
@@ -251,6 +268,7 @@ struct FeatureExtractor::State {
   std::vector<std::int32_t> moment_offsets;
   tracker::CornerFinder finder;
   std::vector<Corner> corners;
+  std::vector<Corner> spare;          ///< of the same cells, weaker
   std::vector<std::uint8_t> weights;  ///< of the corners, where there are too many
   std::vector<TrackerFeature> features;
   std::array<int, kTrackerLevels> thresholds{};  ///< of corners, by level
@@ -258,21 +276,23 @@ struct FeatureExtractor::State {
   std::size_t slice_level = 0;  ///< of begin() and extend(): where the next slice starts
   int row = 0;
   std::size_t next = 0;  ///< corner
+  std::size_t next_spare = 0;
   bool described = true;
-  bool smoothed = false;
+  unsigned smoothed = 0;  ///< a bit a level
 
   bool extend_corners(std::int64_t& work);
-  bool extend_codes(std::int64_t& work);
+  bool describe_all(std::span<const Corner> all, std::size_t& at, std::int64_t& work);
   State(int width, const DetectOptions& with) : options(with), finder(width, with) {}
   void smooth_level(std::size_t level);
   [[nodiscard]] int noise_threshold(const GrayImage& image) const;
   bool search_dimmer();
   void weigh();
-  void strongest();
+  void strongest(std::size_t most, std::vector<Corner>& of);
   void describe(const Corner& corner);
 };
 
-FeatureExtractor::FeatureExtractor(std::unique_ptr<State> state) : state_(std::move(state)) {}
+[[gnu::cold]] FeatureExtractor::FeatureExtractor(std::unique_ptr<State> state)
+    : state_(std::move(state)) {}
 [[gnu::cold]] FeatureExtractor::~FeatureExtractor() = default;
 
 [[gnu::cold]] std::unique_ptr<FeatureExtractor> FeatureExtractor::create(
@@ -302,8 +322,9 @@ FeatureExtractor::FeatureExtractor(std::unique_ptr<State> state) : state_(std::m
     }
   }
   state->corners.reserve(cells * static_cast<std::size_t>(options.per_cell));
+  state->spare.reserve(state->corners.capacity());
   state->weights.reserve(state->corners.capacity());
-  state->features.reserve(static_cast<std::size_t>(options.max_features));
+  state->features.reserve(static_cast<std::size_t>(options.max_features + options.max_spare));
   return std::unique_ptr<FeatureExtractor>(new FeatureExtractor(std::move(state)));
 }
 
@@ -364,10 +385,8 @@ void FeatureExtractor::State::weigh() {
   }
 }
 
-void FeatureExtractor::State::strongest() {
-  const std::size_t most = static_cast<std::size_t>(options.max_features);
-  if (corners.size() <= most) return;
-  weigh();
+/// Leaves `most` of the corners, by `weights`.
+void FeatureExtractor::State::strongest(std::size_t most, std::vector<Corner>& of) {
   std::array<std::size_t, 256> histogram{};
   for (const std::uint8_t weight : weights) ++histogram[weight];
   std::size_t above = 0;
@@ -378,12 +397,12 @@ void FeatureExtractor::State::strongest() {
   }
   std::size_t ties = most - above;
   std::size_t kept = 0;
-  for (std::size_t i = 0; i < corners.size(); ++i) {
+  for (std::size_t i = 0; i < of.size(); ++i) {
     if (weights[i] < cut || (weights[i] == cut && ties == 0)) continue;
     if (weights[i] == cut) --ties;
-    corners[kept++] = corners[i];
+    of[kept++] = of[i];
   }
-  corners.resize(kept);
+  of.resize(kept);
 }
 
 void FeatureExtractor::State::describe(const Corner& corner) {
@@ -426,12 +445,13 @@ void FeatureExtractor::State::describe(const Corner& corner) {
 void FeatureExtractor::begin() {
   State& state = *state_;
   state.corners.clear();
+  state.spare.clear();
   state.features.clear();
   state.slice_level = 0;
   state.row = 0;
-  state.next = 0;
+  state.next = state.next_spare = 0;
   state.described = false;
-  state.smoothed = false;
+  state.smoothed = 0;
   state.dim = false;
   state.thresholds.fill(state.options.threshold);
 }
@@ -445,7 +465,7 @@ bool FeatureExtractor::State::extend_corners(std::int64_t& work) {
     if (work <= 0) return false;
     work -= kPixelCost * kRows * levels[slice_level].width;
     if (finder.find(levels[slice_level], static_cast<std::uint8_t>(slice_level),
-                    thresholds[slice_level], kRows, row, corners))
+                    thresholds[slice_level], kRows, row, corners, spare))
       continue;
     row = 0;
     if (++slice_level == count && search_dimmer()) slice_level = 0;
@@ -483,26 +503,27 @@ bool FeatureExtractor::State::search_dimmer() {
   }
   dim = true;
   corners.clear();
+  spare.clear();
   for (std::size_t level = 0; level < smooth.size(); ++level) {
     thresholds[level] = noise_threshold(levels[level]);
   }
   return true;
 }
 
-/// False while corners are left to describe.
-bool FeatureExtractor::State::extend_codes(std::int64_t& work) {
+/// Describes the corners from `at` on, which it moves; false while some are left.
+bool FeatureExtractor::State::describe_all(std::span<const Corner> all, std::size_t& at,
+                                           std::int64_t& work) {
   constexpr std::int64_t kSmoothCost = 7;       // instructions a pixel
   constexpr std::int64_t kDescribeCost = 4600;  // and a feature
-  for (; next < corners.size(); ++next) {
+  for (; at < all.size(); ++at) {
     if (work <= 0) return false;
-    const std::size_t at = corners[next].level;
-    if (!smoothed || at != slice_level) {
-      slice_level = at;
-      smoothed = true;
-      smooth_level(at);
-      work -= kSmoothCost * levels[at].width * levels[at].height;
+    const std::size_t level = all[at].level;
+    if ((smoothed >> level & 1) == 0) {
+      smoothed |= 1u << level;
+      smooth_level(level);
+      work -= kSmoothCost * levels[level].width * levels[level].height;
     }
-    describe(corners[next]);
+    describe(all[at]);
     work -= kDescribeCost;
   }
   return true;
@@ -512,10 +533,25 @@ bool FeatureExtractor::extend(std::int64_t& work) {
   State& state = *state_;
   if (!state.described) {
     if (!state.extend_corners(work)) return false;
-    state.strongest();
+    const auto most = static_cast<std::size_t>(state.options.max_features);
+    if (state.corners.size() > most) {
+      state.weigh();
+      state.strongest(most, state.corners);
+    }
     state.described = true;
   }
-  return state.extend_codes(work);
+  return state.describe_all(state.corners, state.next, work);
+}
+
+bool FeatureExtractor::extend_spare(std::int64_t& work) {
+  State& state = *state_;
+  const auto most = static_cast<std::size_t>(state.options.max_spare);
+  if (state.spare.size() > most) {
+    state.weights.clear();
+    for (const Corner& corner : state.spare) state.weights.push_back(corner.score);
+    state.strongest(most, state.spare);
+  }
+  return state.describe_all(state.spare, state.next_spare, work);
 }
 
 std::span<const TrackerFeature> FeatureExtractor::found() const {

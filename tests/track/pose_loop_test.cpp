@@ -1,8 +1,10 @@
 // Our own pose loop from end to end: a record baked from a picture, frames rendered by the bench's
 // renderer, and input that means harm.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <map>
 
 #include <gtest/gtest.h>
 
@@ -75,6 +77,80 @@ TEST(TrackerFeatures, PrintLeavesRoomForAPictureOnIt) {
     return place.contains(cv::Point(static_cast<int>(f.x), static_cast<int>(f.y)));
   });
   EXPECT_GT(inside, 0.25 * 400 * place.area() / frame.size().area());
+}
+
+// By brute force over the cells: what comes late is weaker than all that a cell had before, and
+// only where that cell was full.
+TEST(TrackerFeatures, SpareOnesAreTheNextStrongestOfFullCells) {
+  cv::Mat frame(480, 640, CV_8UC1);
+  cv::RNG noise(5);
+  noise.fill(frame, cv::RNG::UNIFORM, 0, 256);
+  cv::GaussianBlur(frame, frame, {}, 1.2);
+  DetectOptions options;
+  options.threshold = 6;
+  const auto extractor = FeatureExtractor::create(frame.cols, frame.rows, options);
+  extractor->set_frame(test::gray(frame));
+  const std::size_t count = extractor->features().size();
+  const auto slice = [&] {
+    std::int64_t work = 1;
+    return extractor->extend_spare(work);
+  };
+  while (!slice()) continue;
+  const auto all = extractor->found();
+  ASSERT_GT(all.size(), count + 500);
+  EXPECT_LE(all.size(), count + 1500);
+  struct Cell {
+    int kept = 0;
+    int weakest = 255;
+    int spare = 0;
+    int strongest = 0;
+  };
+  std::map<std::array<int, 3>, Cell> cells;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const float scale = static_cast<float>(1 << all[i].level);
+    Cell& cell = cells[{all[i].level, static_cast<int>((all[i].x + 0.5f) / scale) / options.cell,
+                        static_cast<int>((all[i].y + 0.5f) / scale) / options.cell}];
+    ++(i < count ? cell.kept : cell.spare);
+    if (i < count) cell.weakest = std::min(cell.weakest, int{all[i].score});
+    if (i >= count) cell.strongest = std::max(cell.strongest, int{all[i].score});
+  }
+  for (const auto& [at, cell] : cells) {
+    if (cell.spare == 0) continue;
+    EXPECT_EQ(cell.kept, options.per_cell) << at[0] << ' ' << at[1] << ' ' << at[2];
+    EXPECT_LE(cell.spare, options.per_cell);
+    EXPECT_LE(cell.strongest, cell.weakest) << at[0] << ' ' << at[1] << ' ' << at[2];
+  }
+}
+
+// A cell of the frame shows most of a small pattern, but has room for a dozen features.
+TEST(PoseLoop, FindsSmallPatternsByTheSpareFeatures) {
+  const Camera camera = default_camera(640, 480);
+  const auto bytes = bundle_with({record()});
+  SceneBand band;
+  band.area_low = 0.015 * 640 * 480 / (picture().cols * picture().rows);
+  band.area_high = 2.5 * band.area_low;
+  std::array<int, 2> found{};
+  for (const int spare : {0, 1}) {
+    PoseLoopOptions options;
+    options.track = false;
+    options.detect.per_cell = 5;  // the picture has few corners
+    if (spare == 0) options.detect.max_spare = 0;
+    auto loop = PoseLoop::create(BundleView::open(bytes).value(), camera, options);
+    ASSERT_TRUE(loop) << to_line(loop.error());
+    Random random(4);
+    for (int i = 0; i < 12; ++i) {
+      const Pose pose = draw_pose(band, test::gray(picture()), camera, random);
+      const SceneFrame scene =
+          render_scene(test::gray(picture()), camera, pose,
+                       clutter(640, 480, static_cast<std::uint32_t>(100 + i)), band, random);
+      const auto result = (*loop)->step(scene.picture.view());
+      ASSERT_TRUE(result);
+      if (result->visible.empty()) continue;
+      ++found[static_cast<std::size_t>(spare)];
+      EXPECT_LT(worst_corner(result->visible[0], scene), 2.0) << i;
+    }
+  }
+  EXPECT_GT(found[1], found[0] + 1) << found[0] << " without them";
 }
 
 TEST(PoseLoop, FindsThePatternWhereItIs) {

@@ -33,6 +33,8 @@ struct DetectOptions {
   /// matching grows with it. 1,000 / 1,250 / 1,500: half-covered patterns were 95.0 % right with
   /// the first and 98.8 % with the second; small ones gained 2 % more with the third.
   int max_features = 1500;
+  /// Most features that extend_spare() adds, of those that `per_cell` left out, the strongest.
+  int max_spare = 1500;
   /// Levels of the pyramid that are searched for features, at most.
   int levels = 8;
   /// SIMD level, 0: the lowest that this program was built for; -1: the best of this processor. All
@@ -74,6 +76,9 @@ class FeatureExtractor {
   /// then. work: about how many ARMv7 instructions extend() may take; it subtracts what it took.
   void begin();
   bool extend(std::int64_t& work);
+  /// After that, in slices as well: adds to found() the next strongest of each cell, at most
+  /// per_cell; of a small thing in a large frame a cell shows most.
+  bool extend_spare(std::int64_t& work);
   [[nodiscard]] std::span<const TrackerFeature> found() const;
 
  private:
