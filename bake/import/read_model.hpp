@@ -22,6 +22,10 @@ bool is_model_file(const std::string& path);
 /// "model.format", whose cure converts what it is.
 Result<void> require_model_format(const std::string& path);
 
+/// An OBJ file that begins with zeros, or is large and has some inside, as a copy that broke off
+/// leaves: read_model() refuses it. A few looks, however large it is.
+bool is_broken_off(const std::string& path);
+
 struct ReadOptions {
   unsigned jobs = 1;  ///< threads; the result does not depend on it
 };
@@ -33,7 +37,8 @@ inline constexpr std::uint64_t kObjBlockBytes = std::uint64_t{1} << 17;
 
 /// Reads an OBJ file and the MTL files it names. Positions are parsed in double with correct
 /// rounding. Oddities become diagnostics with their line; an error is returned only where nothing
-/// is left to read: kIo "io.open"; kInvalidInput "obj.utf16", "obj.no-faces", "obj.too-large".
+/// is left to read: kIo "io.open"; kInvalidInput "obj.utf16", "obj.not-text" (see is_broken_off()),
+/// "obj.no-faces", "obj.too-large".
 Result<SourceModel> read_obj(const std::string& path, const ReadOptions& options = {});
 
 /// The same from memory, for fuzzing and tests. folder: where mtllib names are looked up; empty:

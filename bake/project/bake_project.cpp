@@ -14,6 +14,7 @@
 #include <set>
 
 #include "bake/bundle/link_bundles.hpp"
+#include "bake/import/read_model.hpp"
 #include "bake/io/terminal.hpp"
 #include "bake/json.hpp"
 #include "bake/pattern/alike_patterns.hpp"
@@ -180,7 +181,10 @@ class ProjectBake {
 
   void plan(Task& task) {
     const std::string file = project_.path(task.asset->file);
-    task.inputs = {{fs::path(task.asset->file).filename().string(), digests_.of(file)}};
+    // What the reader will refuse at once may have gigabytes.
+    const bool broken = !task.asset->pattern && is_broken_off(file);
+    task.inputs = {{fs::path(task.asset->file).filename().string(),
+                    broken ? std::string(kNoFile) : digests_.of(file)}};
     task.action = digest_of(std::string(task.asset->pattern ? "pattern" : "model") + "\n" +
                             program_ + "\n" + task.inputs[0].path + "\n" + task.inputs[0].digest +
                             "\n" + size_of(*task.asset) + "\n" + joined(task.settings));

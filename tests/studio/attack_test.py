@@ -166,6 +166,20 @@ class Gate(StudioTest):
         self.assertLess(peak() - before, 40 * 1024)
         self.assertGreaterEqual(self.running.ask("POST", "api/edit", b"x" * (5 * MIB), {"Content-Type": "application/json"}).status, 400)
 
+    def test_a_huge_file_beside_it_is_refused_soon(self):
+        """5 GB, of which the disk has a few bytes, as a copy that broke off leaves them: zeros, or a line of its own and zeros."""
+        table = '[[model]]\nfile = "huge.obj"\n\n[[scene]]\npattern = "a"\nmodel = "huge"\n'
+        (self.folder / "modar.toml").write_text('[[pattern]]\nfile = "a.png"\n\n' + table)
+        for head in (b"", b"v 0 0 0\n"):
+            with open(self.folder / "huge.obj", "wb") as huge:
+                huge.write(head)
+                huge.truncate(5 << 30)
+            start = time.monotonic()
+            name, told, _ = self.running.job("api/bake", {})
+            self.assertEqual((name, told["errors"][0]["code"], told["errors"][0]["where"]), ("failed", "obj.not-text", "huge.obj"), told)
+            print(f"5 GB: {time.monotonic() - start:.1f} s")
+            self.assertLess(time.monotonic() - start, 20)  # however loaded the machine is; to read them takes a minute then
+
     def test_many_connections_and_listeners_are_bounded(self):
         silent = [socket.create_connection(("127.0.0.1", self.running.port)) for _ in range(12)]
         self.assertEqual(self.running.get("api/project").status, 200)

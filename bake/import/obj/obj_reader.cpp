@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <condition_variable>
@@ -335,7 +336,8 @@ Result<void> to_result(LoadResult worst, const std::string& label) {
   }
   if (worst == LoadResult::kTooLarge) {
     return fail(ExitCode::kInvalidInput, "obj.too-large", label,
-                "the file has more than 1,073,741,823 vertices, corners or bytes in one statement",
+                "the file has more than 1,073,741,823 vertices or corners, or a line of more than "
+                "64 MiB",
                 "split the model into several files");
   }
   return {};
@@ -386,6 +388,30 @@ bool is_utf16(std::string_view head) {
          (byte(0) != 0 && byte(1) == 0 && byte(2) != 0 && byte(3) == 0);
 }
 
+/// Refuses zeros where a text should be, which a copy that broke off leaves: at the start, and at
+/// places of a large file, before gigabytes of them are read. Errors: "obj.not-text".
+Result<void> require_text(const ByteSource& source, const std::string& label) {
+  constexpr std::uint64_t kLooks = 16;
+  constexpr std::uint64_t kLarge = 1u << 20;  // bytes
+  constexpr std::array<char, 64> kZeros{};
+  std::array<char, 64> bytes;
+  for (std::uint64_t i = 0; i <= (source.size() < kLarge ? 0 : kLooks); ++i) {
+    const std::uint64_t at =
+        (source.size() - std::min<std::uint64_t>(source.size(), bytes.size())) / kLooks * i;
+    const std::int64_t got = source.read(at, bytes.size(), bytes.data());
+    const std::size_t looked = i == 0 ? 1 : bytes.size();
+    const bool zeros = got >= static_cast<std::int64_t>(looked) &&
+                       std::memcmp(bytes.data(), kZeros.data(), looked) == 0;
+    if (zeros) {
+      return fail(
+          ExitCode::kInvalidInput, "obj.not-text", label,
+          "it has zeros at byte " + std::to_string(at + 1) + ": no text, or a copy that broke off",
+          "copy or export it again");
+    }
+  }
+  return {};
+}
+
 /// Releases the unused capacity of arrays that grew in steps.
 void shrink_arrays(SourceModel& model) {
   model.positions.shrink();
@@ -420,6 +446,7 @@ Result<SourceModel> parse_source(const ByteSource& source, const std::string& fo
     return fail(ExitCode::kInvalidInput, "obj.utf16", label, "the file is UTF-16 text",
                 "save it as UTF-8 (or plain ASCII) and bake again");
   }
+  MODAR_TRY(require_text(source, label));
   SourceModel model;
   model.name = stem;
   MODAR_ASSIGN(const std::optional<ObjCounts> bad,
@@ -441,6 +468,18 @@ Result<SourceModel> parse_source(const ByteSource& source, const std::string& fo
 }
 
 }  // namespace
+
+bool is_broken_off(const std::string& path) {
+  if (!path.ends_with(".obj") && !path.ends_with(".OBJ")) return false;
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  struct stat status {};
+  const bool regular =
+      descriptor >= 0 && ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode);
+  const ByteSource source(descriptor, static_cast<std::uint64_t>(status.st_size));
+  const bool broken = regular && !require_text(source, path);
+  if (descriptor >= 0) ::close(descriptor);
+  return broken;
+}
 
 Result<SourceModel> read_obj(const std::string& path, const ReadOptions& options) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
