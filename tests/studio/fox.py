@@ -27,7 +27,15 @@ class Fox:
             display = ":" + end.readline().strip()
         self.process = subprocess.Popen([FIREFOX, "--no-remote", "--profile", folder, "--marionette", f"--width={size[0]}"],
                                         env={**os.environ, "DISPLAY": display, "HOME": str(folder)}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        self.wire, self.rest, self.calls = self._connect(port), b"", 0
+        self.wire, self.rest, self.calls = None, b"", 0
+        try:
+            self._begin(port, size)
+        except BaseException:  # nobody else knows of the processes yet
+            self.close()
+            raise
+
+    def _begin(self, port, size):
+        self.wire = self._connect(port)
         self._message()  # who it is
         self.call("WebDriver:NewSession", capabilities={"alwaysMatch": {}})
         self.call("WebDriver:SetTimeouts", script=90_000)
@@ -103,5 +111,10 @@ class Fox:
     def close(self):
         for process in (self.process, self.screen):
             process.terminate()
-            process.wait(30)
-        self.wire.close()
+            try:
+                process.wait(30)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        if self.wire:
+            self.wire.close()
