@@ -9,6 +9,8 @@ const ROUND = 48;
 const BODY = { side: '#e2dbcd', cap: '#c9c0b0' };
 /** CSS pixels by which cells overlap, so that no seam is seen between them. */
 const SEAM_PX = 0.7;
+/** Share of a cell's picture that is drawn beyond its edges, for the same. */
+const OVERLAP = 0.1;
 
 const around = ({ top_mm: top, bottom_mm: bottom }) => (Math.PI * (top + (bottom || top))) / 2;
 const isRound = ({ kind }) => kind === 'cylinder' || kind === 'cone';
@@ -56,7 +58,7 @@ function round(pattern, { width, height }) {
   const rim = (y) => Array.from({ length: ROUND }, (_, i) => point((2 * Math.PI * i) / ROUND, y));
   const widest = radius + Math.abs(slope) * halfHeight;
   return {
-    unit: (mm * most) / (2 * width), caps: [rim(halfHeight), rim(-halfHeight).reverse()],
+    unit: (mm * most) / (2 * width), caps: [rim(halfHeight).reverse(), rim(-halfHeight)],
     faces: [{ picture: undefined, cells: [ROUND, 1], at: wall(halfArc, 2 * Math.PI - halfArc) }, { picture: '', cells: CELLS, at: wall(-halfArc, halfArc) }],
     low: [-widest, -rise * halfHeight, -radius - widest], high: [widest, rise * halfHeight, widest - radius],
   };
@@ -129,13 +131,16 @@ export class SurfacePainter {
   #cell(context, image, [a, b, c, d], [left, top, width, height], dense) {
     const [w, h] = [image.naturalWidth, image.naturalHeight];
     const [x, y, u, v] = [left * w, top * h, width * w, height * h];
+    // More than the cell, or its own blurred edge is a seam.
+    const [startX, startY] = [Math.max(0, x - OVERLAP * u), Math.max(0, y - OVERLAP * v)];
+    const [acrossX, acrossY] = [Math.min(w, x + (1 + OVERLAP) * u) - startX, Math.min(h, y + (1 + OVERLAP) * v) - startY];
     const triangle = (corners, right, down, from) => {
       context.save();
       context.setTransform(dense, 0, 0, dense, 0, 0);
       outline(context, grown(corners));
       context.clip();
       context.transform(right[0] / u, right[1] / u, down[0] / v, down[1] / v, from[0] - (right[0] * x) / u - (down[0] * y) / v, from[1] - (right[1] * x) / u - (down[1] * y) / v);
-      context.drawImage(image, x, y, u, v, x, y, u, v);
+      context.drawImage(image, startX, startY, acrossX, acrossY, startX, startY, acrossX, acrossY);
       context.restore();
     };
     const minus = (p, q) => [p[0] - q[0], p[1] - q[1]];
