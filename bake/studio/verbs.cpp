@@ -1,4 +1,7 @@
 // Which handler answers which request.
+#include <cstdlib>
+
+#include "bake/process/process.hpp"
 #include "bake/project/project.hpp"
 #include "bake/studio/edits.hpp"
 #include "bake/studio/inside.hpp"
@@ -48,6 +51,22 @@ Answer send_bundle(Session& session, const Call& call) {
   return path ? send_file(session, *path) : answer_of(path.error());
 }
 
+/// The folder of what was made, in the desktop's own program for files.
+Answer show_folder(Session& session) {
+  const auto state = session.text.read();
+  if (!state) return answer_of(state.error());
+  const std::string folder = path_in(session, read_draft(state->text, session.file).project.out);
+  // Without a desktop xdg-open may begin a browser in our terminal, and wait for it.
+  const auto is_set = [](const char* name) {
+    const char* value = std::getenv(name);
+    return value != nullptr && *value != '\0';
+  };
+  const bool desktop = is_set("DISPLAY") || is_set("WAYLAND_DISPLAY");
+  if (desktop && run_process({{"xdg-open", folder}, {}, {}}) == 0) return answer_of(Json::object());
+  return answer_of(Error{ExitCode::kUnsupported, "studio.show", "",
+                         "no program that shows folders answers", "open it yourself: " + folder});
+}
+
 Answer answer_get(Session& session, const Call& call) {
   if (call.path == "api/project") return answer_or_error(project_view(session));
   if (call.path == "api/bundle") return send_bundle(session, call);
@@ -82,6 +101,7 @@ Answer answer_post(Session& session, const Call& call) {
   if (call.path == "api/export") return post_export(session, body);
   if (call.path == "api/corners") return post_corners(session, body);
   if (call.path == "api/rectify") return post_rectify(session, body);
+  if (call.path == "api/show") return show_folder(session);
   if (call.path == "api/quit") {
     session.quit();
     return answer_of(Json::object());

@@ -1,6 +1,7 @@
 """`modar studio` as a curator uses it: from an empty folder to a page, by mouse and by keys, in a browser."""
 import functools
 import json
+import math
 import os
 import pathlib
 import shutil
@@ -80,6 +81,19 @@ def walk(photo, film):
     return film
 
 
+def can(label, photo, diameter, arc, size=(1312, 992)):
+    """A photo of a label round a can, by a pinhole camera as long as the photo is wide: each pixel's ray meets the can at an angle and a height."""
+    (width, height), radius, far = size, diameter / 2, 3.2 * diameter
+    high = math.pi * diameter * arc / 360 * 0.75  # the label's sides are 4:3
+    half = math.radians(arc) / 2
+    ray = f"st(0,(X-{width / 2})/{width});st(1,(Y-{height / 2})/{width});st(2,1+ld(0)*ld(0));st(3,{far * far}-ld(2)*{far * far - radius * radius})"
+    hit = f"st(4,({far}-sqrt(max(ld(3),0)))/ld(2));st(5,atan2(ld(0)*ld(4),{far}-ld(4)));st(6,ld(1)*ld(4))"
+    inside = f"gt(ld(3),0)*lt(abs(ld(5)),{half})*lt(abs(ld(6)),{high / 2})"
+    planes = ":".join(f"{plane}='{ray};{hit};if({inside},{plane}(W*(0.5+ld(5)/{2 * half}),H*(0.5+ld(6)/{high})),if(gt(ld(3),0),225,120))'" for plane in "rgb")
+    # The label is as large as the photo, so that geq's picture has its size.
+    subprocess.run(["ffmpeg", "-v", "error", "-i", label, "-vf", f"scale={width}:{height},format=gbrp,geq=interpolation=bilinear:{planes}", "-frames:v", "1", photo], check=True)
+
+
 def turned_model(folder):
     """The pot with Y up, as most programs write OBJ files."""
     lines = []
@@ -141,8 +155,8 @@ class Page(StudioTest):
         self.assertEqual(self.hand.run(AXE), [], name)
 
     def assert_no_errors(self):
-        """A bake that is asked for while one ends is refused, and asked for again."""
-        self.assertEqual([error for error in self.hand.errors if not ("409" in error and error.endswith("api/bake"))], [])
+        """A bake or an export that is asked for while one ends is refused, and asked for again."""
+        self.assertEqual([error for error in self.hand.errors if not ("409" in error and error.endswith(("api/bake", "api/export")))], [])
 
     def toml(self):
         return (self.project / "modar.toml").read_text()
@@ -263,12 +277,16 @@ class Page(StudioTest):
             if source == "camera":
                 hand.click(".way button.quiet")
             else:
-                node = hand.call("DOM.querySelector", nodeId=hand.call("DOM.getDocument")["root"]["nodeId"], selector=".way input[type=file]")["nodeId"]
-                hand.call("DOM.setFileInputFiles", files=[str(self.folder / "walk.mp4")], nodeId=node)
+                self.choose_film()
             hand.wait("document.querySelector('.playing .hint')?.textContent.includes('wall')", source)
             self.keep(f"14-{source}")
             self.assertGreater(self.model_pixels(), 2000, source)
             hand.click(".playing .over")
+
+    def choose_film(self):
+        call = self.hand.call
+        node = call("DOM.querySelector", nodeId=call("DOM.getDocument")["root"]["nodeId"], selector=".way input[type=file]")["nodeId"]
+        call("DOM.setFileInputFiles", files=[str(self.folder / "walk.mp4")], nodeId=node)
 
     def model_pixels(self):
         """Of the screen that are bright where the camera's picture is taken away: the pot's."""
@@ -430,6 +448,86 @@ class Page(StudioTest):
         band = next(one for one in self.modar_json("inspect", bundle)["patterns"] if one["name"] == "band")
         self.assertAlmostEqual(band["width_mm"], 110, delta=0.1)
 
+    def test_a_label_on_a_can_is_found_in_a_film_of_it(self):
+        """What is tried here is what a device does: both know the can of the same film, and the pot stands on it."""
+        self.project.mkdir()
+        picture(self.project / "band.png", 480, 360)
+        shutil.copy(POTTERY, self.project)
+        (self.project / "modar.toml").write_text('[[pattern]]\nfile = "band.png"\nshape = "cylinder,diameter=80mm,arc=150"\n\n'
+                                                 '[[model]]\nfile = "pottery.obj"\n\n[[scene]]\npattern = "band"\nmodel = "pottery"\n')
+        can(self.project / "band.png", self.folder / "can.png", diameter=80, arc=150)
+        walk(self.folder / "can.png", self.folder / "walk.mp4")
+        self.start()
+        hand = self.hand
+        hand.wait("document.querySelector('.status')?.textContent.includes('Ready')", "the bake")
+        hand.run("location.hash = '#/try'")
+        hand.wait("document.querySelector('.way input[type=file]')", "the ways")
+        self.choose_film()
+        hand.wait("document.querySelector('.playing .hint')?.textContent.includes('band')", "the can")
+        self.keep("can")
+        self.assertGreater(self.model_pixels(), 2000)
+        bundle = next((self.project / "out").glob("*.modar"))
+        done = self.run_program("modar-play", bundle, "--input", self.folder / "walk.mp4", "--json")
+        frames = [line for line in map(json.loads, done.stdout.splitlines()) if "frame" in line]
+        self.assertEqual([len(line["visible"]) for line in frames[2:]], [1] * 4, done.stderr)
+        self.assert_no_errors()
+
+    # ---- by an editor, meanwhile ----
+
+    def test_what_a_hand_writes_is_shown_and_baked_as_the_command_does(self):
+        """modar.toml changes under the open page; what the page then adds keeps it, and `modar bake` makes the same bytes."""
+        self.project.mkdir()
+        picture(self.project / "cover.png")
+        for name in ("pottery.obj", "pottery.mtl", "pottery.png"):
+            shutil.copy(POTTERY.with_name(name), self.project)
+        text = ('[bake]\nloop-views = 8\nparameters = ["none"]\n\n[[pattern]]\nfile = "cover.png"\nwidth-mm = 200\n\n[[model]]\nfile = "pottery.obj"\n\n'
+                '[[scene]]\npattern = "cover"\nmodel = "pottery"\n')
+        (self.project / "modar.toml").write_text(text)
+        self.start()
+        hand = self.hand
+        hand.run("location.hash = '#/scene/cover'")
+        hand.wait("document.querySelector('.layers canvas')", "the stage")
+        by_hand = text + "turn = 33  # by hand\nheight = \"90mm\"\n\n# the end\n"
+        (self.project / "modar.toml").write_text(by_hand)
+        hand.wait("document.getElementById('turn-2').value === '33' && document.getElementById('size').value === '9'", "what the hand has written")
+        hand.tab_to("#offset-lift")
+        hand.press("ArrowUp", 2)
+        self.wait_for("offset = ")
+        self.assertEqual([line for line in by_hand.splitlines() if line not in self.toml()], [])
+        hand.wait("fetch('api/project').then((answer) => answer.json()).then(({ bundle, baking }) => bundle.baked && !bundle.stale && !baking)", "the bake")
+        other = self.folder / "other"
+        other.mkdir()
+        for file in self.project.iterdir():
+            if file.is_file():
+                shutil.copy(file, other)
+        self.assertEqual(self.modar("bake", "--quiet", cwd=other).returncode, 0)
+        [ours], [theirs] = ([*(folder / "out").glob("*.modar")] for folder in (self.project, other))
+        self.assertEqual(ours.read_bytes(), theirs.read_bytes())
+        self.assert_no_errors()
+
+    # ---- what cannot be used ----
+
+    def test_what_cannot_be_used_is_named_with_its_cure(self):
+        """Kinds that nothing here reads stay outside; what is damaged is named, and leaves the project by a click."""
+        self.project.mkdir()
+        picture(self.project / "cover.png")
+        shutil.copy(POTTERY, self.project)
+        (self.project / "modar.toml").write_text('[[pattern]]\nfile = "cover.png"\n\n[[model]]\nfile = "pottery.obj"\n\n[[scene]]\npattern = "cover"\nmodel = "pottery"\n')
+        for name, data in (("IMG_1.HEIC", b"ftypheic"), ("vase.fbx", b"Kaydara"), ("broken.obj", b"hello\n")):
+            (self.source / name).write_bytes(data)
+        self.start()
+        hand = self.hand
+        hand.drop(sorted(self.source.iterdir()))
+        hand.wait("document.querySelectorAll('.problems .finding').length === 3", "what is wrong")
+        told = hand.run("document.querySelector('.problems').innerText")
+        for words in ("IMG_1.HEIC", "JPEG", "vase.fbx", "GLB", "broken.obj", "no usable face"):
+            self.assertIn(words, told)
+        self.assertEqual([path.name for path in self.project.iterdir() if path.name in ("IMG_1.HEIC", "vase.fbx")], [])
+        self.keep("problems")
+        hand.click(".problems .link")
+        hand.wait("document.querySelectorAll('.problems .finding').length === 2 && document.querySelector('.status')?.textContent.includes('Ready')", "a bake")
+        self.assertNotIn("broken", self.toml())
+
     # ---- names and texts ----
 
     def test_names_and_texts_are_shown_and_never_run(self):
@@ -448,6 +546,12 @@ class Page(StudioTest):
         for i, name in enumerate(sorted(names)):
             hand.run(f"location.hash = '#/picture/' + encodeURIComponent({json.dumps(name)})")
             hand.wait(f"document.querySelector('h1').textContent === {json.dumps(name)}", name)
+        hand.run(f"location.hash = '#/picture/' + encodeURIComponent({json.dumps(names[1])})")
+        hand.click(".titled .tool")
+        hand.call("Input.insertText", text="<b>\u05d0</b> \"new\"")
+        hand.press("Enter")
+        hand.wait("document.querySelector('h1')?.textContent === '<b>\u05d0</b> \"new\"'", "the new name")
+        self.assertIn("<b>\u05d0</b> \"new\"", [table.get("name") for table in tomllib.loads(self.toml())["pattern"]])
         hand.run(f"location.hash = '#/scene/' + encodeURIComponent({json.dumps(names[0])})")
         hand.wait("document.querySelector('.stage3d')", "the scene")
         if hand.run("document.querySelectorAll('.standing li').length") == 0:

@@ -7,7 +7,7 @@ import { Scene } from './scene.js';
 import { Ship } from './ship.js';
 import { cancel, isBakeable, listen, load, missingFiles, redo, state, tellError, undo } from './state.js';
 import { Try } from './try.js';
-import { bytes, firstLanguage, LANGUAGES, languageName, t, useLanguage } from './words.js';
+import { bytes, firstLanguage, LANGUAGES, languageName, sentence, t, useLanguage } from './words.js';
 
 const m = window.m;
 const VIEWS = { files: Files, picture: Picture, scene: Scene, try: Try, ship: Ship };
@@ -57,7 +57,7 @@ function status() {
   if (progress) {
     return m('span.status', meter(progress.done, t('preparing')), m('span', percent(progress.done)), tool(t('cancel'), 'close', cancel));
   }
-  if (failure) return m('a.status.bad', { href: addressOf('ship') }, icon('bad'), t('notPrepared'));
+  if (failure) return m('a.status.bad', { href: addressOf(failure.kind === 'bake' ? 'files' : 'ship') }, icon('bad'), t('notPrepared'));
   if (!project.bundle.baked) return null;
   return m('span.status', icon('check'), t('prepared', { size: bytes(project.bundle.bytes) }));
 }
@@ -72,7 +72,7 @@ function bar(now, pattern) {
       tool(t('redo'), 'redo', redo, { disabled: !project.redo, 'aria-keyshortcuts': 'Control+Shift+Z' }),
       m('select.language', { 'aria-label': t('language'), onchange: (event) => useLanguage(event.target.value).then(m.redraw) },
         LANGUAGES.map((tag) => m('option', { value: tag, lang: tag, selected: tag === document.documentElement.lang, 'aria-label': languageName(tag) }, tag.toUpperCase()))),
-      tool(t('quit'), 'close', quit)));
+      tool(t('quit'), 'power', quit)));
 }
 
 async function quit() {
@@ -92,7 +92,7 @@ function notice() {
   }
   return m('div.notices', { 'aria-live': told?.bad ? 'assertive' : 'polite' }, told && m(`div.notice${told.bad ? '.bad' : ''}`,
     { onpointerenter: () => clearTimeout(noticeTimer) }, icon(told.bad ? 'bad' : 'check'),
-    m('div', m('p', { dir: 'auto' }, told.text), told.cure && m('p.cure', { dir: 'auto' }, told.cure)), tool(t('close'), 'close', hush)));
+    m('div', m('p', { dir: 'auto' }, sentence(told.text)), told.cure && m('p.cure', { dir: 'auto' }, sentence(told.cure))), tool(t('close'), 'close', hush)));
 }
 
 function hush() {

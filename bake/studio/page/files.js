@@ -1,8 +1,8 @@
 // Step 1: what the project is made of. Pictures and models are dropped here; what a model lacks is named.
 import { askJson, thumb } from './api.js';
-import { button, finding, grade, head, icon, meter, name } from './parts.js';
-import { addFiles, addScene, begin, missingFiles, patternOf, scenesOf, setPattern, state, tell, tellError } from './state.js';
-import { modelViews } from './thumbs.js';
+import { button, finding, grade, head, icon, meter, name, noThumb, tool } from './parts.js';
+import { addFiles, addScene, begin, deleteAsset, missingFiles, patternOf, scenesOf, setPattern, state, tell, tellError } from './state.js';
+import { ModelThumb } from './thumbs.js';
 import { length, number, t } from './words.js';
 
 const m = window.m;
@@ -11,8 +11,14 @@ const m = window.m;
 let sending = null;
 /** What the server said of the files that came last and are not well. */
 let problems = [];
+/** Pictures and models that stand side by side, without scrolling. */
+const FEW = 2;
 /** Pictures whose corners somebody should look at. */
 export const unsure = new Set();
+
+/** Kinds that people have and nothing here reads, which would lie in the project unused. */
+const FOREIGN = { photo: /\.(hei[cf]|avif|gif|svg|pdf|psd|ai|dng|nef|cr[23]|arw|orf|rw2|raf)$/i, model: /\.(fbx|dae|blend|3ds|max|usd[acz]?|step|stp|iges|skp|3mf|c4d|ma|mb|lwo|x3d|wrl|ztl)$/i };
+const foreignKind = (file) => Object.keys(FOREIGN).find((kind) => FOREIGN[kind].test(file));
 
 /** A model's own files go first: what they name as texture is no picture to be found. */
 const ORDER = [/\.(mtl|bin)$/i, /\.(obj|gltf|glb|ply|stl)$/i, /\.zip$/i];
@@ -53,17 +59,28 @@ async function pair() {
   if (models.length === 1 && patterns.length === 1 && !scenes.length) await addScene(patterns[0].name, models[0].name);
 }
 
-/** Of photos that are new, what stands out as the picture is cut out. A scan, which it fills, stays as it is. */
+const toHundredths = (corners) => corners.map((corner) => corner.map((value) => Number(value.toFixed(2))));
+
+/** Of a photo, what a picture that it was taken for covers at least: what is smaller and not sharp is part of a scan. */
+const LEAST_SHARE = 0.25;
+
+/** The area of four corners, as a share of the photo. */
+const shareOf = ({ corners, width, height }) => Math.abs(corners.reduce((sum, [x, y], i) => {
+  const [nextX, nextY] = corners[(i + 1) % 4];
+  return sum + x * nextY - nextX * y;
+}, 0)) / 2 / (width * height);
+
+/** Of photos that are new, what stands out as the picture is cut out. A scan, which it fills or in which nothing stands out, stays as it is. */
 async function findPictures(files) {
   for (const pattern of state.project.patterns.filter((each) => files.includes(each.file) && !each.corners)) {
     try {
-      const { corners, sure, reason } = await askJson('POST', 'corners', { file: pattern.file });
-      if (reason === 'fills') continue;
-      await setPattern(pattern.name, { corners });
-      if (!sure) unsure.add(pattern.name);
+      const found = await askJson('POST', 'corners', { file: pattern.file });
+      const { corners, sure, reason } = found;
+      const stands = sure || reason === 'framed' || (reason === 'blurred' && shareOf(found) >= LEAST_SHARE);
+      if (stands) await setPattern(pattern.name, { corners: toHundredths(corners) });
+      if (stands && !sure) unsure.add(pattern.name);
     } catch (error) {
       if (error.status === 0) throw error;
-      unsure.add(pattern.name);  // none was found: the person says where it is
     }
   }
 }
@@ -71,11 +88,13 @@ async function findPictures(files) {
 export async function receive(files) {
   if (!files.length) return;
   try {
-    const told = await addFiles([...files].sort((a, b) => rank(a) - rank(b)), (done, total, file) => {
+    const foreign = files.filter(({ name: file }) => foreignKind(file))
+      .map(({ name: file }) => ({ text: t(`foreign.${foreignKind(file)}`), cure: t(`foreign.${foreignKind(file)}Cure`), file, lang: document.documentElement.lang }));
+    const told = await addFiles(files.filter(({ name: file }) => !foreignKind(file)).sort((a, b) => rank(a) - rank(b)), (done, total, file) => {
       sending = { done, total, name: file };
       m.redraw();
     });
-    problems = told.flatMap(({ name: file, problems: some = [] }) => some.map((problem) => ({ ...problem, file })));
+    problems = [...foreign, ...told.flatMap(({ name: file, problems: some = [] }) => some.map((problem) => ({ ...problem, file })))];
     if (!problems.length) tell(t('filesAdded', { n: told.reduce((sum, { added = [] }) => sum + Math.max(1, added.length), 0) }));
     await findPictures(told.flatMap(({ added = [] }) => added));
     await pair();
@@ -96,26 +115,21 @@ const chooser = (label, { folder = false, kind = '', shape } = {}) => m('label.b
   },
 }));
 
-const noThumb = (event) => {
-  event.redraw = false;
-  event.target.hidden = true;
-};
-
-/** A model's views side by side, which a card turns, once they have been drawn. */
-const modelThumb = (model) => m('span.thumb.turning', icon('model'), modelViews(model.name) && m('img', { src: modelViews(model.name), alt: '' }));
 const pictureThumb = (pattern) => m('span.thumb', icon('picture'), m('img', { src: thumb(pattern.file, 320), alt: '', loading: 'lazy', onerror: noThumb }));
+
+const takeOut = (table, asset) => tool(t('takeOut', { name: asset }), 'trash', () => deleteAsset(table, asset), { class: 'take-out' });
 
 function pictureCard(pattern) {
   const standing = scenesOf(pattern.name).length;
-  return m('li', { key: pattern.name }, m('a.card', { href: `#/picture/${encodeURIComponent(pattern.name)}` }, pictureThumb(pattern), m('span.about',
+  return m('li', { key: pattern.name }, takeOut('pattern', pattern.name), m('a.card', { href: `#/picture/${encodeURIComponent(pattern.name)}` }, pictureThumb(pattern), m('span.about',
     m('b', name(pattern.name)), grade(pattern.grade), m('small', pattern.width_mm ? t('wide', { length: length(pattern.width_mm) }) : t('widthUnknown'),
       standing ? ` · ${t('standsOn', { n: standing })}` : ''))));
 }
 
 function modelCard(model) {
   const scene = state.project.scenes.find((each) => each.model === model.name && patternOf(each.pattern));
-  const content = [modelThumb(model), m('span.about', m('b', name(model.name)), m('small', model.missing.length ? [icon('warn'), t('incomplete')] : model.triangles ? t('triangles', { n: model.triangles }) : ''))];
-  return m('li', { key: model.name }, scene ? m('a.card', { href: `#/scene/${encodeURIComponent(scene.pattern)}` }, content) : m('div.card', content));
+  const content = [m(ModelThumb, { model: model.name }), m('span.about', m('b', name(model.name)), m('small', model.missing.length ? [icon('warn'), t('incomplete')] : model.triangles ? t('triangles', { n: model.triangles }) : ''))];
+  return m('li', { key: model.name }, takeOut('model', model.name), scene ? m('a.card', { href: `#/scene/${encodeURIComponent(scene.pattern)}` }, content) : m('div.card', content));
 }
 
 /** What models name and the folder lacks, where it is seen at once. */
@@ -131,26 +145,38 @@ const found = ({ models, pictures }) => m('div.welcome', m('div.art', { 'aria-hi
   head(t('found'), t('foundLead', { models: t('modelCount', { n: models }), pictures: t('pictureCount', { n: pictures }) })),
   m('p.row', button(t('beginHere'), begin, { kind: '.primary' })));
 
-const group = (title, count, cards, empty) => m('section.group', m('h2', title, ' ', m('span.number-of', number(count))),
-  count ? m('ul.cards', cards) : m('p.empty', empty));
+const group = (title, shape, count, cards, empty) => m('section.group', m('h2', title, ' ', m('span.number-of', number(count))),
+  count ? m('ul.cards', cards) : m('div.empty', icon(shape), m('p', empty), chooser(t('chooseFiles'), { kind: '.primary' })));
+
+/** Why nothing could be prepared from what is here: {text, cure, file, and the table and name of what it is about}. */
+function failures() {
+  const { failure, project } = state;
+  if (failure?.kind !== 'bake') return [];
+  return (failure.errors?.length ? failure.errors : [failure]).map(({ error, cure, where = '' }) => {
+    const tables = { model: project.models, pattern: project.patterns };
+    const [table] = Object.keys(tables).filter((each) => tables[each].some(({ file }) => file === where));
+    return { text: error, cure, file: where, table, name: table && tables[table].find(({ file }) => file === where).name };
+  });
+}
 
 function whatNext() {
   const { models, patterns } = state.project;
-  if (!patterns.length) return m('p.next-words', t('nextPhoto'));
-  if (!models.length) return m('p.next-words', t('nextModel'));
+  if (!patterns.length || !models.length) return null;
   return m(`a.button${missingFiles().length ? '.quiet' : '.primary'}`, { href: `#/picture/${encodeURIComponent(patterns[0].name)}` }, m('span', t('toPicture')), icon('next'));
 }
 
 export const Files = {
   view() {
     const { models, patterns, init, problems: wrong } = state.project;
-    const all = [...problems, ...wrong.map(({ error, cure, file, line }) => ({ text: error, cure, file, line }))];
+    const all = [...problems, ...wrong.map(({ error, cure, file, line }) => ({ text: error, cure, file, line })), ...failures()];
     const busy = sending && m('p.sending', { role: 'status' }, meter(sending.done / sending.total, t('sending')), sending.done < sending.total ? [t('sendingFile', { n: sending.total, done: sending.done + 1 }), ' ', name(sending.name)] : t('looking'));
     const told = all.length > 0 && m('section.problems', { 'aria-label': t('problems') }, all.map((problem) => finding({
-      text: `${problem.file ? `${problem.file}${problem.line ? `:${problem.line}` : ''}: ` : ''}${problem.text}`, cure: problem.cure, lang: 'en' })));
+      text: `${problem.file ? `${problem.file}${problem.line ? `:${problem.line}` : ''}: ` : ''}${problem.text}`, cure: problem.cure, lang: problem.lang ?? 'en', severity: 'error' },
+    problem.table && m('p', button(t('remove'), () => deleteAsset(problem.table, problem.name), { kind: '.link.small' })))));
     if (init) return m('div.screen.narrow', found(init), told);
     if (!models.length && !patterns.length) return m('div.screen.narrow', welcome(), busy, told);
     return m('div.screen', m('div.top', head(t('files'), t('filesLead')), m('p.row', chooser(t('addFiles'), { kind: '.quiet', shape: 'add' }), whatNext())), busy, told, m('div', lacking()),
-      group(t('pictures'), patterns.length, patterns.map(pictureCard), t('nextPhoto')), group(t('models'), models.length, models.map(modelCard), t('nextModel')));
+      m(`div.groups${Math.max(patterns.length, models.length) <= FEW ? '.few' : ''}`, group(t('pictures'), 'picture', patterns.length, patterns.map(pictureCard), t('nextPhoto')),
+        group(t('models'), 'model', models.length, models.map(modelCard), t('nextModel'))));
   },
 };

@@ -1,5 +1,5 @@
 // Parts that every screen is made of. What people wrote is only ever text: nothing here or elsewhere makes HTML of it.
-import { inUnit, number, settings, t, UNITS } from './words.js';
+import { inUnit, number, sentence, settings, t, UNITS } from './words.js';
 
 const m = window.m;
 /** Milliseconds after the last step of a number until it counts. */
@@ -23,6 +23,9 @@ const SHAPES = {
   camera: 'M4 8h4l2-2.5h4L16 8h4v11H4z M12 10a3.5 3.5 0 1 0 .01 0z',
   film: 'M4 6h12v12H4z M16 10.5l4-2.5v8l-4-2.5',
   model: 'M12 3l7 4v9l-7 4-7-4V7z M5 7l7 4 7-4 M12 11v9',
+  power: 'M12 3.5v8 M7.2 6.6a8 8 0 1 0 9.6 0',
+  tip: 'M9.5 17.5h5 M10.5 20.5h3 M8.5 14.6a6 6 0 1 1 7 0c-.7.6-1 1.4-1 2.2h-5c0-.8-.3-1.6-1-2.2z',
+  pencil: 'M5 19l1-4L16.5 4.5l3 3L9 18z M14 7l3 3',
   trash: 'M5 7h14 M10 4h4 M7 7l1 13h8l1-13',
   upright: 'M12 17V4 M8 8l4-4 4 4 M5 20h14',
   move: 'M12 3v18 M3 12h18 M9 6l3-3 3 3 M9 18l3 3 3-3 M6 9l-3 3 3 3 M18 9l3 3-3 3',
@@ -112,8 +115,8 @@ export const LengthField = {
 };
 
 /** What a person reads of something that is not well: {text, cure, severity}; lang: of what the server said, its language. */
-export const finding = ({ text, cure, severity = 'warning', lang }, ...more) => m(`div.finding.${severity}`, icon(severity === 'note' ? 'check' : severity === 'error' ? 'bad' : 'warn'),
-  m('div', m('p', { dir: 'auto', lang }, text), cure && m('p.cure', { dir: 'auto', lang }, cure), more));
+export const finding = ({ text, cure, severity = 'warning', lang }, ...more) => m(`div.finding.${severity}`, icon(severity === 'note' ? 'tip' : severity === 'error' ? 'bad' : 'warn'),
+  m('div', m('p', { dir: 'auto', lang }, sentence(text)), cure && m('p.cure', { dir: 'auto', lang }, sentence(cure)), more));
 
 export const grade = (letter) => letter && m('span.grade', { class: `grade-${letter}`, 'aria-label': t('gradeOf', { grade: letter }), role: 'img' }, letter);
 
@@ -124,6 +127,12 @@ export const meter = (share, label) => m('progress', { max: 1, value: share, 'ar
 
 /** A screen's head, which gets the focus when the screen is opened. */
 export const head = (title, lead) => m('div.head', m('h1', { tabindex: -1, id: 'title' }, title), lead && m('p', lead));
+
+/** For an image that cannot be had: what lies under it shows. */
+export const noThumb = (event) => {
+  event.redraw = false;
+  event.target.hidden = true;
+};
 
 /** Names of one's own are isolated: their direction is their own. */
 export const name = (text) => m('bdi', text);

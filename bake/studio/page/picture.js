@@ -2,10 +2,10 @@
 import { ask, askJson, Newest, thumb } from './api.js';
 import { Corners } from './corners.js';
 import { unsure } from './files.js';
-import { button, choice, finding, grade, head, icon, LengthField, name, NumberField } from './parts.js';
+import { button, choice, finding, grade, head, icon, LengthField, name, NumberField, tool } from './parts.js';
 import { rail } from './rail.js';
 import { arcOf, alongOf, widthOf } from './surface.js';
-import { addScene, deleteAsset, loadRivals, loadScore, setPattern, state, tellError } from './state.js';
+import { addScene, deleteAsset, loadRivals, loadScore, patternOf, setPattern, state, tellError } from './state.js';
 import { number, t } from './words.js';
 
 const m = window.m;
@@ -87,7 +87,7 @@ class Preview {
 
 // ---- how good it is ----
 
-const distance = (cm) => (cm >= 100 ? `${number(Number((cm / 100).toFixed(1)))} m` : `${number(Number(cm.toFixed(cm < 10 ? 1 : 0)))} cm`);
+const distance = (cm) => (Math.round(cm) >= 100 ? `${number(Number((cm / 100).toFixed(1)))} m` : `${number(Number(cm.toFixed(cm < 10 ? 1 : 0)))} cm`);
 
 function reach({ range_cm: known, range_widths: widths }, width) {
   const range = known ?? (width && widths?.map((each) => (each * width) / 10));
@@ -121,6 +121,7 @@ export class Picture {
     this.paper = this.kind = null;
     this.shape = {};
     this.features = true;
+    this.naming = false;
   }
 
   onupdate({ attrs }) {
@@ -230,11 +231,32 @@ export class Picture {
       kind === 'flat' ? this.sizes(pattern) : this.shapeFields(pattern, kind)];
   }
 
+  /** Its name, which visitors read, and a field to change it. */
+  title(pattern) {
+    if (!this.naming) {
+      return m('div.titled', head(name(pattern.name)), tool(t('rename'), 'pencil', () => { this.naming = true; }));
+    }
+    const done = (event) => {
+      const wanted = event.target.value.trim();
+      this.naming = false;
+      if (!wanted || wanted === pattern.name) return;
+      setPattern(pattern.name, { name: wanted }).then(() => {
+        if (patternOf(wanted)) location.replace(`#/picture/${encodeURIComponent(wanted)}`);
+      });
+    };
+    return m('div.field', m('label', { for: 'name' }, t('name')), m('input', { id: 'name', type: 'text', dir: 'auto', value: pattern.name, oncreate: ({ dom }) => dom.select(), onchange: done,
+      onkeydown: (event) => {
+        if (event.key === 'Enter') event.target.blur();
+        if (event.key === 'Escape') this.naming = false;
+      }, onblur: () => { this.naming = false; } }));
+  }
+
   /** A frontal file becomes a photo: its corners are looked for, and are the photo's own where none stand out. */
   async cutOut(pattern) {
     try {
-      const { corners } = await askJson('POST', 'corners', { file: pattern.file });
-      await setPattern(pattern.name, { corners });
+      const { corners, sure } = await askJson('POST', 'corners', { file: pattern.file });
+      if (!sure) unsure.add(pattern.name);
+      await setPattern(pattern.name, { corners: corners.map((corner) => corner.map((value) => Number(value.toFixed(2)))) });
     } catch (error) {
       if (!error.corners) tellError(error);
       else await setPattern(pattern.name, { corners: error.corners });
@@ -277,7 +299,7 @@ export class Picture {
   view({ attrs: { pattern } }) {
     const score = state.scores.get(pattern.name);
     return m('div.work', rail('picture', pattern), m('section.stage', { 'aria-label': t('photo') }, this.stage(pattern)),
-      m('aside.panel', m('div.fill', head(name(pattern.name)), unsure.has(pattern.name) && finding({ text: t('unsure'), cure: t('unsureCure') }),
+      m('aside.panel', m('div.fill', this.title(pattern), unsure.has(pattern.name) && finding({ text: t('unsure'), cure: t('unsureCure') }),
         score?.failed && finding({ text: score.failed, cure: score.cure, severity: 'error', lang: 'en' }),
         m('div.seen', m(Preview, { pattern, score: this.features && score?.features ? score : null, handle: (preview) => { this.preview = preview; } }),
           m('div', verdict(pattern), m('label.check', m('input', { type: 'checkbox', checked: this.features, onchange: (event) => { this.features = event.target.checked; } }), t('showFeatures')))),

@@ -5,12 +5,15 @@ import { rail } from './rail.js';
 import { EYES, HANDLES, Stage } from './stage.js';
 import { addScene, deleteScene, modelOf, scenesOf, bundleBytes, setScene, state, tellError } from './state.js';
 import { surfaceOf } from './surface.js';
-import { modelViews } from './thumbs.js';
+import { ModelThumb } from './thumbs.js';
 import { languageName, length, number, t } from './words.js';
 
 const m = window.m;
 /** What the bake takes where a scene says nothing: the model's own axis. */
 const AXES = ['y', 'z', 'x', '-y', '-z', '-x'];
+
+/** Models that a picture on which nothing stands offers as buttons; a list has them all. */
+const MOST_OFFERS = 6;
 
 const rounded = (value, digits = 4) => Number(value.toPrecision(digits));
 const degrees = (value) => Number(wrapped(value).toFixed(1)) + 0;
@@ -170,7 +173,7 @@ export class Scene {
   fields(scene) {
     const leans = scene.turn[0] !== 0 || scene.turn[1] !== 0;
     return [m('div.fields', this.sizeField(scene), this.turnField(scene, 2)), m('div.fields.three', this.offsetFields(scene)),
-      m('div.row', button(t('tipOver'), () => setScene(scene, { up: this.nextSide(scene) }), { kind: '.quiet.small', shape: 'turn' }),
+      m('div.row.three', button(t('tipOver'), () => setScene(scene, { up: this.nextSide(scene) }), { kind: '.quiet.small', shape: 'turn' }),
         button(t('snapUpright'), () => setScene(scene, turnValues([0, 0, scene.turn[2]])), { kind: '.quiet.small', shape: 'upright', disabled: !leans }),
         button(t('toMiddle'), () => setScene(scene, { offset: null }), { kind: '.quiet.small', shape: 'move', disabled: scene.offset.every((each) => each === 0) })),
       m('details', { ontoggle: (event) => { this.tilting = event.target.open; } }, m('summary', t('tilt')),
@@ -197,10 +200,10 @@ export class Scene {
     });
     return m('section', m('h2', t('onPicture')), m('ul.standing', scenes.map((scene) => m('li', { key: scene.key, class: scene.key === this.selected ? 'chosen' : '' },
       m('button.plain', { type: 'button', 'aria-pressed': String(scene.key === this.selected), onclick: () => this.select(scene.key) },
-        m('span.thumb.little.turning', icon('model'), modelViews(scene.model) && m('img', { src: modelViews(scene.model), alt: '' })), name(scene.name || scene.model)),
+        m(ModelThumb, { model: scene.model, little: true }), name(scene.name || scene.model)),
       tool(t('takeOff', { name: scene.model }), 'trash', () => deleteScene(scene))))),
-    all.length === 1 && !scenes.length && button(t('standOn', { name: all[0].name }), () => add(all[0].name), { kind: '.primary', shape: 'add' }),
-    (all.length > 1 || scenes.length > 0) && m('div.field.add', m('label.unseen', { for: 'add' }, t('addModel')), m('select', { id: 'add', value: '', onchange: (event) => {
+    !scenes.length && m('div.offers', all.slice(0, MOST_OFFERS).map((model) => button(t('standOn', { name: model.name }), () => add(model.name), { key: model.name, kind: all.length > 1 ? '.quiet' : '.primary', shape: 'add' }))),
+    (all.length > MOST_OFFERS || scenes.length > 0) && m('div.field.add', m('label.unseen', { for: 'add' }, t('addModel')), m('select', { id: 'add', value: '', onchange: (event) => {
       if (event.target.value) add(event.target.value);
     } }, m('option', { value: '' }, t('addModel')), all.map((model) => m('option', { value: model.name }, model.name)))));
   }

@@ -1,21 +1,26 @@
 // Step 5: what the bundle weighs, whether it is good, and the forms in which it leaves this machine.
 import { ask, askJson } from './api.js';
 import { button, finding, head, icon, meter, name, percent } from './parts.js';
-import { state, tellError } from './state.js';
-import { bytes, t, told } from './words.js';
+import { isBaking, state, tell, tellError } from './state.js';
+import { bytes, sentence, t, told } from './words.js';
 
 const m = window.m;
 const KINDS = ['page', 'zip', 'apk', 'release'];
+/** Milliseconds between looks at whether the server is still at work. */
+const BUSY_MS = 150;
 /** Parts that are named one by one; the others are one line. */
 const NAMED_PARTS = 6;
 
-const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1) + (/[.!?]$/.test(text) ? '' : '.');
+const whole = (text) => sentence(text) + (/[.!?]$/.test(text) ? '' : '.');
 
 /** What the checker found, in the page's language where it has the words: {text, cure, lang}. */
 function issue(id, english, cure, place) {
   const { text, lang } = told(`issue.${id}`, english);
-  return { text: [place?.name && [name(place.name), ': '], sentence(text)], cure: sentence(told(`issue.${id}.cure`, cure).text), lang };
+  return { text: [place?.name && [name(place.name), ': '], whole(text)], cure: whole(told(`issue.${id}.cure`, cure).text), lang };
 }
+
+/** In this machine's own program for files. */
+const showFolder = () => ask('POST', 'show', {}).catch((error) => tell(error.message, { cure: error.cure, bad: true }));
 
 export class Ship {
   oninit() {
@@ -47,13 +52,24 @@ export class Ship {
     this.refused.delete(kind);
     state.exported.delete(kind);
     this.making = kind;
-    try {
-      await ask('POST', 'export', { kind, title: this.title, ...(kind === 'release' && this.passPhrase ? { pass_phrase: this.passPhrase } : {}) });
-    } catch (error) {
-      this.making = null;
-      this.refused.set(kind, { text: error.message, cure: error.package ? t('install', { packages: [error.package].flat().join(' ') }) : error.cure });
+    const wish = { kind, title: this.title, ...(kind === 'release' && this.passPhrase ? { pass_phrase: this.passPhrase } : {}) };
+    for (let asked = false; !asked;) {
+      while (isBaking()) await new Promise((done) => { setTimeout(done, BUSY_MS); });  // what leaves is what was changed last
+      try {
+        await ask('POST', 'export', wish);
+        asked = true;
+      } catch (error) {
+        if (error.code === 'studio.busy') await new Promise((done) => { setTimeout(done, BUSY_MS); });
+        else asked = this.refuse(kind, error);
+      }
     }
     m.redraw();
+  }
+
+  refuse(kind, error) {
+    this.making = null;
+    this.refused.set(kind, { text: error.message, cure: error.package ? t('install', { packages: [error.package].flat().join(' ') }) : error.cure });
+    return true;
   }
 
   // ---- what it is ----
@@ -79,7 +95,7 @@ export class Ship {
   phones() {
     if (!this.devices) return null;
     return m('section', m('h2', t('devices')), m('ul.devices', this.devices.map((device) => m('li', { key: device.name, class: device.fits ? 'fits' : 'fails' },
-      icon(device.fits ? 'check' : 'bad'), m('span', device.title || device.name, m('span.unseen', ` ${t(device.fits ? 'fits' : 'fitsNot')}`),
+      icon(device.fits ? 'check' : 'bad'), m('span', told(`device.${device.name}`, device.title || device.name).text, m('span.unseen', ` ${t(device.fits ? 'fits' : 'fitsNot')}`),
         (device.findings ?? []).filter(({ severity }) => severity === 'error').map(({ id, text: english, cure, place }) => {
           const { text, cure: remedy, lang } = issue(id, english, cure, place);
           return m('small', { dir: 'auto', lang }, text, ' ', remedy);
@@ -99,7 +115,8 @@ export class Ship {
       button(t(`ship.${kind}Make`), () => this.make(kind), { kind: kind === 'page' ? '.primary' : '.quiet', disabled: this.making !== null }),
       busy && m('p', { role: 'status' }, meter(state.progress?.done ?? 0, t('preparing'))),
       refused && finding({ ...refused, severity: 'error', lang: 'en' }),
-      done && m('p.made', { role: 'status' }, icon('check'), m('span', t('made'), ' ', m('code', name(done.path)), done.url && [' ', m('a', { href: done.url, target: '_blank', rel: 'noopener' }, t(kind === 'page' ? 'look' : 'download'))])));
+      done && m('div.made', { role: 'status' }, icon('check'), m('div', m('p', t('made')), m('p', m('code', name(`${state.project.folder}/${done.path}`))), m('p.row', button(t('showFolder'), showFolder, { kind: '.link.small' }),
+        done.url && m('a.small', { href: done.url, target: '_blank', rel: 'noopener' }, t('download')), kind === 'page' && m('a.small', { href: '#/try' }, t('tryOnPhone'))))));
   }
 
   view() {

@@ -1,5 +1,6 @@
 // The project as the server has it, and every change of it: one place, so that undo, the file on disk and what is shown agree.
 import { ask, askJson, pathOf, Refused } from './api.js';
+import { bytes, t } from './words.js';
 
 /**
  * Milliseconds without a change after which the bundle is baked anew: trades an answer soon against bakes that are thrown away. What is
@@ -132,11 +133,18 @@ export const begin = () => queued(async () => take(await askJson('POST', 'init',
 export const undo = () => queued(async () => take(await askJson('POST', 'undo', {}))).catch(tellError);
 export const redo = () => queued(async () => take(await askJson('POST', 'redo', {}))).catch(tellError);
 
+/** Bytes that the server takes of a file, see kMostUploadBytes of server.cpp. */
+const MOST_BYTES = 2 ** 31;
+
 /** Sends files one after the other: {name, blob}. Answers what the server said of each. */
 export async function addFiles(files, onProgress) {
   const told = [];
   for (const [i, { name, blob }] of files.entries()) {
     onProgress(i, files.length, name);
+    if (blob.size > MOST_BYTES) {  // the server would hang up
+      told.push({ name, problems: [{ text: t('tooLarge', { size: bytes(blob.size) }), cure: t('tooLargeCure') }] });
+      continue;
+    }
     try {
       const answer = await queued(() => askJson('PUT', `files/${pathOf(name)}`, blob));
       told.push({ name, ...answer });
@@ -170,8 +178,14 @@ async function bake(where) {
 
 function bakeSoon(where) {
   clearTimeout(bakeTimer);
-  bakeTimer = setTimeout(() => bake(where), BAKE_AFTER_MS[where]);
+  bakeTimer = setTimeout(() => {
+    bakeTimer = 0;
+    bake(where);
+  }, BAKE_AFTER_MS[where]);
 }
+
+/** Whether a bake runs, or is about to. */
+export const isBaking = () => bakeTimer !== 0 || state.progress?.kind === 'bake';
 
 /** A bake that read a file while it was written is made again. */
 const lasting = (failure) => (failure?.code === 'project.changing' ? null : failure);
@@ -234,7 +248,7 @@ export function listen() {
   on('progress', (progress) => { state.progress = progress; });
   on('project', ({ revision, files = false }) => { if (files || revision !== state.project?.revision) follow(); });
   on('baked', ({ findings = [], errors = [] }) => {
-    Object.assign(state, { progress: null, failure: lasting(errors.length ? { kind: 'bake', ...errors[0] } : null), findings });
+    Object.assign(state, { progress: null, failure: lasting(errors.length ? { kind: 'bake', ...errors[0], errors } : null), findings });
     ++state.baked;
     queued(load).catch(tellError);
   });

@@ -17,6 +17,7 @@ class Player {
 
   constructor(box, told) {
     this.told = told;
+    this.box = box;
     this.video = box.querySelector('video');
     this.layers = { picture: box.querySelector('.picture'), models: box.querySelector('.models') };
   }
@@ -40,6 +41,7 @@ class Player {
       Object.assign(this.video, { src: this.address, loop: true });
     } else this.video.srcObject = source;
     await this.video.play();
+    this.box.style.aspectRatio = `${this.video.videoWidth} / ${this.video.videoHeight}`;  // all of it is seen
     await tracker.start(this.video, { extended: true });
   }
 

@@ -37,6 +37,9 @@ export function t(key, values = {}) {
   return text.replace(/\{(\w+)\}/g, (all, name) => (typeof values[name] === 'number' ? number(values[name]) : values[name] ?? all));
 }
 
+/** What the server says in parts of a sentence, as one; of what begins with a file's name, the name stays. */
+export const sentence = (text) => (typeof text === 'string' && /^[a-z]+[ ,]/.test(text) ? text.charAt(0).toUpperCase() + text.slice(1) : text);
+
 /** The words of a key, or what the server said in English: {text, lang}. */
 export const told = (key, english) => (words[key] ? { text: words[key] } : { text: english, lang: 'en' });
 
