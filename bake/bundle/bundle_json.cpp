@@ -47,8 +47,7 @@ Json level_json(const LevelFigures& levels) {
 
 /// What the meta text has under a model's key.
 std::optional<Json> stated(const BundleView& bundle, std::uint32_t model, const char* key) {
-  const std::optional<Json> models = Json::parse(bundle.meta()).find("models");
-  const std::optional<Json> one = models ? models->at(model) : std::nullopt;
+  const std::optional<Json> one = stated_list(bundle, "models").at(model);
   return one ? one->find(key) : std::nullopt;
 }
 
@@ -199,9 +198,16 @@ Json range_json(const ScoreRange& range, double width_mm) {
           {"sentence", range_sentence(range, width_mm)}};
 }
 
+Json stated_list(const BundleView& bundle, const char* key) {
+  return Json::parse(bundle.meta()).find(key).value_or(Json());
+}
+
 std::optional<ScoreRange> stated_range(const BundleView& bundle, std::uint32_t pattern) {
-  const std::optional<Json> patterns = Json::parse(bundle.meta()).find("patterns");
-  const std::optional<Json> one = patterns ? patterns->at(pattern) : std::nullopt;
+  return range_in(stated_list(bundle, "patterns"), pattern);
+}
+
+std::optional<ScoreRange> range_in(const Json& patterns, std::uint32_t pattern) {
+  const std::optional<Json> one = patterns.at(pattern);
   const Json values = one ? one->find("range").value_or(Json()) : Json();
   if (values.size() != 5) return std::nullopt;
   std::array<double, 5> numbers{};
@@ -334,7 +340,12 @@ std::optional<LevelFigures> stated_levels(const BundleView& bundle, std::uint32_
 }
 
 std::optional<Upright> stated_upright(const BundleView& bundle, std::uint32_t model) {
-  const std::optional<Json> found = stated(bundle, model, "up");
+  return upright_in(stated_list(bundle, "models"), model);
+}
+
+std::optional<Upright> upright_in(const Json& models, std::uint32_t model) {
+  const std::optional<Json> one = models.at(model);
+  const std::optional<Json> found = one ? one->find("up") : std::nullopt;
   if (!found) return std::nullopt;
   const auto axis = up_axis_of(found->find("axis").value_or("").text().value_or(""));
   const std::string reason = found->find("reason").value_or("").text().value_or("");

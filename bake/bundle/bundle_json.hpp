@@ -32,6 +32,12 @@ std::optional<Upright> stated_upright(const BundleView& bundle, std::uint32_t mo
 
 /// Where a pattern is recognised, as the bake measured it. Nothing: it was not scored.
 std::optional<ScoreRange> stated_range(const BundleView& bundle, std::uint32_t pattern);
+
+/// What a bundle states of its "models" or "patterns", and the same two of it: whoever asks of many
+/// parses the text once, which grows with them.
+Json stated_list(const BundleView& bundle, const char* key);
+std::optional<Upright> upright_in(const Json& models, std::uint32_t model);
+std::optional<ScoreRange> range_in(const Json& patterns, std::uint32_t pattern);
 /// "range" of the documents.
 Json range_json(const ScoreRange& range, double width_mm);
 

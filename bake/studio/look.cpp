@@ -160,7 +160,7 @@ Result<Json> devices(Session& session) {
   return list;
 }
 
-Json model_facts(const BundleView& bundle, std::uint32_t index) {
+Json model_facts(const BundleView& bundle, const Json& stated, std::uint32_t index) {
   const ModelRecord& model = bundle.models()[index];
   std::array<double, 3> least{};
   std::array<double, 3> most{};
@@ -177,15 +177,15 @@ Json model_facts(const BundleView& bundle, std::uint32_t index) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     size.push_back(model.scale * (most[axis] - least[axis]));
   }
-  const auto upright = stated_upright(bundle, index);
+  const auto upright = upright_in(stated, index);
   return {{"triangles", model.triangle_count},
           {"size", std::move(size)},
           {"up", upright ? Json(up_axis_name(upright->axis)) : Json()}};
 }
 
-Json pattern_facts(const BundleView& bundle, std::uint32_t index) {
+Json pattern_facts(const BundleView& bundle, const Json& stated, std::uint32_t index) {
   const PatternRecord& pattern = bundle.patterns()[index];
-  const auto range = stated_range(bundle, index);
+  const auto range = range_in(stated, index);
   if (!range) return {{"grade", nullptr}, {"score", nullptr}, {"range_cm", nullptr}};
   const double cm = static_cast<double>(pattern.width_mm) / 10;
   return {{"grade", std::string(1, grade_of(*range))},
@@ -200,11 +200,14 @@ BakedFacts baked_facts(const std::string& bundle) {
   const auto file = MappedFile::open(bundle);
   const auto view = file ? BundleView::open(file->bytes()) : Result<BundleView>();
   if (!file || !view) return facts;
+  const Json models = stated_list(*view, "models");
   for (std::uint32_t m = 0; m < view->models().size(); ++m) {
-    facts.models[std::string(view->name(view->models()[m].name))] = model_facts(*view, m);
+    facts.models[std::string(view->name(view->models()[m].name))] = model_facts(*view, models, m);
   }
+  const Json patterns = stated_list(*view, "patterns");
   for (std::uint32_t p = 0; p < view->patterns().size(); ++p) {
-    facts.patterns[std::string(view->name(view->patterns()[p].name))] = pattern_facts(*view, p);
+    facts.patterns[std::string(view->name(view->patterns()[p].name))] =
+        pattern_facts(*view, patterns, p);
   }
   return facts;
 }
