@@ -71,12 +71,15 @@ void GeometryStore::merge_vertex_ranges() {
   // One range a distinct start; the longest level that starts there decides its size.
   std::vector<std::uint32_t> order(vertex_ranges_.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+  const auto before = [&](std::uint32_t a, std::uint32_t b) {
     const Range& left = vertex_ranges_[a];
     const Range& right = vertex_ranges_[b];
     if (left.layout != right.layout) return left.layout < right.layout;
     return left.source != right.source ? left.source < right.source : a < b;
-  });
+  };
+  // Once a bundle: std::sort() is four times as long.
+  std::make_heap(order.begin(), order.end(), before);
+  std::sort_heap(order.begin(), order.end(), before);
   std::vector<Range> merged;
   for (const std::uint32_t level : order) {
     const Range& range = vertex_ranges_[level];
