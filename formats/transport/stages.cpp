@@ -31,42 +31,11 @@ std::uint32_t coarsest_stand_in(const BundleView& bundle, std::uint32_t model) {
   return kNone;
 }
 
-/// The first level of a texture that is shown at LoadStage::kShow, counted from its finest.
-std::uint32_t first_shown(const BundleView& bundle, const TextureRecord& texture) {
-  std::uint32_t level = 0;
-  for (; level + 1 < texture.level_count; ++level) {
-    const TextureLevelRecord& record = bundle.texture_levels()[texture.first_level + level];
-    if (std::max<std::uint32_t>(record.width, record.height) <= kShownSide) break;
-  }
-  return level;
-}
-
-/// Of each model its coarsest stand-in, or all of it where it has none: bytes of the section of
-/// vertices or indices.
-std::vector<StageRange> shown_geometry(const BundleView& bundle, bool indices) {
-  std::vector<StageRange> shown;
-  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
-    const std::uint32_t stand_in = coarsest_stand_in(bundle, m);
-    const ChunkGroup group = bundle.chunk_group(stand_in == kNone ? m : stand_in);
-    const std::uint32_t vertex = bundle.layouts()[bundle.models()[m].layout].stride;
-    for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
-      const ChunkRecord& chunk = bundle.chunks()[group.first_chunk + c];
-      for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
-        const LevelRecord& level = bundle.levels()[chunk.first_level + l];
-        shown.push_back(
-            {indices ? level.index_offset : level.vertex_offset,
-             indices ? 2ull * level.index_count : std::uint64_t{level.vertex_count} * vertex});
-      }
-    }
-  }
-  return shown;
-}
-
 /// Levels of a texture that are shown first: bytes of its section.
 std::vector<StageRange> shown_blocks(const BundleView& bundle, std::uint32_t number) {
   const TextureRecord& texture = bundle.textures()[number];
   std::vector<StageRange> shown;
-  for (std::uint32_t l = first_shown(bundle, texture); l < texture.level_count; ++l) {
+  for (std::uint32_t l = first_shown_level(bundle, texture); l < texture.level_count; ++l) {
     const TextureLevelRecord& level = bundle.texture_levels()[texture.first_level + l];
     shown.push_back({level.offset, level.size});
     if (level.alpha_offset != kNoOffset) shown.push_back({level.alpha_offset, level.size});
@@ -153,6 +122,34 @@ Record& writable(std::span<std::byte> bytes, const BundleView& bundle, const Rec
 
 }  // namespace
 
+std::uint32_t first_shown_level(const BundleView& bundle, const TextureRecord& texture) {
+  std::uint32_t level = 0;
+  for (; level + 1 < texture.level_count; ++level) {
+    const TextureLevelRecord& record = bundle.texture_levels()[texture.first_level + level];
+    if (std::max<std::uint32_t>(record.width, record.height) <= kShownSide) break;
+  }
+  return level;
+}
+
+std::vector<StageRange> shown_geometry(const BundleView& bundle, bool indices) {
+  std::vector<StageRange> shown;
+  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
+    const std::uint32_t stand_in = coarsest_stand_in(bundle, m);
+    const ChunkGroup group = bundle.chunk_group(stand_in == kNone ? m : stand_in);
+    const std::uint32_t vertex = bundle.layouts()[bundle.models()[m].layout].stride;
+    for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle.chunks()[group.first_chunk + c];
+      for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
+        const LevelRecord& level = bundle.levels()[chunk.first_level + l];
+        shown.push_back(
+            {indices ? level.index_offset : level.vertex_offset,
+             indices ? 2ull * level.index_count : std::uint64_t{level.vertex_count} * vertex});
+      }
+    }
+  }
+  return shown;
+}
+
 std::vector<StageRange> stage_ranges(const BundleView& bundle) {
   return Planner(bundle).plan();
 }
@@ -210,7 +207,7 @@ void use_stand_ins(std::span<std::byte> bytes, const BundleView& bundle) {
 
 void show_coarsest(std::span<std::byte> bytes, const BundleView& bundle) {
   for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
-    const std::uint32_t first = first_shown(bundle, bundle.textures()[t]);
+    const std::uint32_t first = first_shown_level(bundle, bundle.textures()[t]);
     TextureRecord& texture = writable(bytes, bundle, bundle.textures()[t]);
     texture.first_level += first;
     texture.level_count -= first;

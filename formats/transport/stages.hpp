@@ -45,6 +45,14 @@ struct Overlap {
 Overlap overlap(std::uint64_t start, std::uint64_t size, std::uint64_t offset,
                 std::span<const std::byte> bytes);
 
+/// The level of a texture, counted from its finest, from which on LoadStage::kShow shows it.
+std::uint32_t first_shown_level(const BundleView& bundle, const TextureRecord& texture);
+
+/// Of each model its coarsest stand-in, or all of it where it has none, which LoadStage::kShow
+/// shows: bytes from the start of the section of indices or vertices. Unsorted, some more than
+/// once.
+std::vector<StageRange> shown_geometry(const BundleView& bundle, bool indices);
+
 /// What a program needs to have in memory when vertices, indices and texture blocks are on the GPU:
 /// all that lies before them, what LoadStage::kShow shows, and the indices that a draw order sorts.
 /// Some bytes more than once; `stage` means nothing.

@@ -183,13 +183,16 @@ modar_renderer* modar_renderer_create(const modar_bundle* bundle, const char* de
   return made.release();
 }
 
-modar_renderer* modar_renderer_create_part(const modar_bundle* bundle, int comes,
+modar_renderer* modar_renderer_create_part(const modar_bundle* bundle, int part, uint64_t gpu_bytes,
                                            modar_error* error) {
   if (bundle == nullptr) {
     modar::hand_over(modar::missing("bundle"), error);
     return nullptr;
   }
-  auto renderer = modar::Renderer::create_part(bundle->view, modar::probe_gl_caps(), comes != 0);
+  modar::GlCaps caps = modar::probe_gl_caps();
+  caps.gpu_memory = gpu_bytes;
+  auto renderer =
+      modar::Renderer::create_part(bundle->view, caps, static_cast<modar::Renderer::Part>(part));
   if (!renderer) {
     modar::hand_over(renderer.error(), error);
     return nullptr;
@@ -198,6 +201,24 @@ modar_renderer* modar_renderer_create_part(const modar_bundle* bundle, int comes
   made->view = bundle->view;
   made->renderer = std::move(*renderer);
   return made.release();
+}
+
+uint32_t modar_renderer_open_wanted(modar_renderer* renderer, uint64_t* offset,
+                                    uint64_t* byte_count) {
+  if (renderer == nullptr) return 0;
+  const modar::Renderer::Wanted wanted = renderer->renderer->open_wanted();
+  *offset = wanted.offset;
+  *byte_count = wanted.size;
+  return wanted.number + 1;
+}
+
+void modar_renderer_have(modar_renderer* renderer, uint32_t number) {
+  if (renderer == nullptr || number == 0) return;
+  renderer->renderer->have(number - 1);
+}
+
+float modar_renderer_lod_error(const modar_renderer* renderer) {
+  return renderer == nullptr ? 0.0f : renderer->renderer->stats().lod_error;
 }
 
 void modar_renderer_put(modar_renderer* renderer, uint64_t offset, const void* bytes, size_t size) {

@@ -11,6 +11,8 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 
+#include "runtime/render/geometry_store.hpp"
+
 namespace modar {
 namespace {
 
@@ -184,6 +186,49 @@ void DrawList::add_item(const Request& request, std::uint32_t item) {
   culled_ += culled;
 }
 
+void DrawList::build_of(const GeometryStore& geometry, const BundleView& bundle,
+                        std::span<const ChunkSetup> setups, const glm::mat4& projection, int height,
+                        std::span<const DrawItem> items, float lod_pixels) {
+  commands_.clear();
+  culled_ = 0;
+  const Request request{bundle, setups, items, lod_pixels};
+  views_.clear();
+  for (std::uint32_t i = 0; i < items.size(); ++i) {
+    const bool drawn = items[i].model < bundle.models().size();
+    views_.push_back(drawn ? model_view(projection, items[i].to_eye, height) : ModelView{});
+    if (drawn) add_there(request, i, geometry);
+  }
+}
+
+void DrawList::add_there(const Request& request, std::uint32_t item,
+                         const GeometryStore& geometry) {
+  const BundleView& bundle = request.bundle;
+  const std::uint32_t model = request.items[item].model;
+  const std::size_t first = commands_.size();
+  int culled = add_group(request, item, model);
+  for (std::uint32_t s = 0; !use_there(bundle, first, geometry); ++s) {
+    commands_.resize(first);
+    culled = 0;
+    while (s < bundle.stand_ins().size() && bundle.stand_ins()[s].model != model) ++s;
+    if (s >= bundle.stand_ins().size()) break;
+    culled = add_group(request, item, bundle.models().size() + s);
+  }
+  culled_ += culled;
+}
+
+/// Brings the commands from `first` on to levels that are there; false if a chunk has none.
+bool DrawList::use_there(const BundleView& bundle, std::size_t first,
+                         const GeometryStore& geometry) {
+  for (std::size_t i = first; i < commands_.size(); ++i) {
+    DrawCommand& command = commands_[i];
+    const ChunkRecord& chunk = bundle.chunks()[command.chunk];
+    while (!geometry.there({&command.level, 1})) {
+      if (++command.level == chunk.first_level + chunk.level_count) return false;
+    }
+  }
+  return true;
+}
+
 /// Adds what is seen of a group's chunks; answers how many are not.
 int DrawList::add_group(const Request& request, std::uint32_t item, std::uint32_t number) {
   const BundleView& bundle = request.bundle;
@@ -215,6 +260,18 @@ int DrawList::add_group(const Request& request, std::uint32_t item, std::uint32_
     if (levels[command.level].index_count > 0) commands_.push_back(command);
   }
   return culled;
+}
+
+float DrawList::greatest_error(const BundleView& bundle) const {
+  float greatest = 0.0f;
+  for (const DrawCommand& command : commands_) {
+    const ModelView& view = views_[command.item];
+    const float error = bundle.levels()[command.level].error * view.scale * view.pixels;
+    if (error > 0.0f) {
+      greatest = std::max(greatest, error / (view.perspective ? command.distance : 1.0f));
+    }
+  }
+  return greatest;
 }
 
 std::uint64_t DrawList::cost(const BundleView& bundle, std::size_t begin, std::size_t end) const {

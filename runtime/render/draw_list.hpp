@@ -18,6 +18,8 @@
 
 namespace modar {
 
+class GeometryStore;
+
 /// One view on one model, in the model's own space.
 struct ModelView {
   std::array<glm::vec4, 6> planes;  ///< a point is inside where dot(plane, (p, 1)) >= 0
@@ -80,6 +82,11 @@ class DrawList {
   void build(const BundleView& bundle, std::span<const ChunkSetup> setups,
              const glm::mat4& projection, int height, std::span<const DrawItem> items,
              float lod_pixels);
+  /// The same of levels that are there: of each item all chunks that are seen, at their level or a
+  /// coarser one, else the finest stand-in, else nothing.
+  void build_of(const GeometryStore& geometry, const BundleView& bundle,
+                std::span<const ChunkSetup> setups, const glm::mat4& projection, int height,
+                std::span<const DrawItem> items, float lod_pixels);
   /// Nearest first: the order in which GPU memory is given out.
   void sort_by_distance();
   /// What only hides, opaque ones by program, texture and material, then blended ones from far to
@@ -89,6 +96,8 @@ class DrawList {
   [[nodiscard]] std::vector<DrawCommand>& commands() { return commands_; }
   [[nodiscard]] const ModelView& view(std::uint32_t item) const { return views_[item]; }
   [[nodiscard]] int culled() const { return culled_; }
+  /// Of the levels of all commands, pixels on the screen.
+  [[nodiscard]] float greatest_error(const BundleView& bundle) const;
   /// Of some commands, in triangles: a draw call counts as some, too.
   [[nodiscard]] std::uint64_t cost(const BundleView& bundle, std::size_t begin,
                                    std::size_t end) const;
@@ -102,6 +111,8 @@ class DrawList {
     float lod_pixels = 0.0f;
   };
   void add_item(const Request& request, std::uint32_t item);
+  void add_there(const Request& request, std::uint32_t item, const GeometryStore& geometry);
+  bool use_there(const BundleView& bundle, std::size_t first, const GeometryStore& geometry);
   int add_group(const Request& request, std::uint32_t item, std::uint32_t group);
   std::vector<DrawCommand> commands_;
   std::vector<ModelView> views_;  ///< one an item

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "formats/transport/stages.hpp"
 #include "formats/vertex_scan.hpp"
 #include "modar/mapped_file.hpp"
 
@@ -14,6 +15,13 @@ namespace {
 /// Vertices that are widened at a time: more would cost memory (16 KB at 4 bytes each way per
 /// attribute), fewer more calls of glBufferSubData. Set by hand.
 constexpr std::size_t kScratchVertices = 4096;
+
+/// What is wrong where vertices cannot be put as they are.
+Result<void> rewritten() {
+  return fail(ExitCode::kUnsupported, "gl.halves", "vertices",
+              "this context reads no half floats, and vertices are rewritten for it",
+              "keep the whole bundle in memory");
+}
 
 GLuint make_buffer(GLenum target) {
   GLuint buffer = 0;
@@ -34,6 +42,7 @@ GeometryStore::GeometryStore(const BundleView& bundle, std::span<const VertexFor
   }
   scratch_.resize(kScratchVertices * widest);
   collect_ranges();
+  list_budget_ = budget_;
   streams_ = budget_ != 0 && total_bytes() > budget_;
 }
 
@@ -146,11 +155,7 @@ void GeometryStore::upload_whole() {
 }
 
 Result<void> GeometryStore::expect() {
-  if (rewrites_) {
-    return fail(ExitCode::kUnsupported, "gl.halves", "vertices",
-                "this context reads no half floats, and vertices are rewritten for it",
-                "keep the whole bundle in memory");
-  }
+  if (rewrites_) return rewritten();
   resident_bytes_ = bundle_.vertices().size() + bundle_.indices().size();
   whole_vertices_ = make_buffer(GL_ARRAY_BUFFER);
   glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(bundle_.vertices().size()), nullptr,
@@ -161,7 +166,90 @@ Result<void> GeometryStore::expect() {
   return {};
 }
 
+Result<void> GeometryStore::expect_wanted() {
+  if (rewrites_) return rewritten();
+  streams_ = true;
+  // A level that is drawn until a finer one of the same chunks has come has half its triangles at
+  // most, and shares its vertices: both fit.
+  list_budget_ = budget_ / 3 * 2;
+  find_kept(false);
+  find_kept(true);
+  return {};
+}
+
+/// Ranges that lie in one of shown_geometry().
+void GeometryStore::find_kept(bool indices) {
+  const std::vector<StageRange> shown = shown_geometry(bundle_, indices);
+  for (Range& range : indices ? index_ranges_ : vertex_ranges_) {
+    range.kept = range.size == 0;
+    for (const StageRange& part : shown) {
+      range.kept = range.kept || (part.offset <= range.source &&
+                                  range.source + range.size <= part.offset + part.size);
+    }
+  }
+}
+
+bool GeometryStore::there(std::span<const std::uint32_t> levels) const {
+  return std::all_of(levels.begin(), levels.end(), [this](std::uint32_t level) {
+    return there(vertex_ranges_[level_vertices_[level]]) && there(index_ranges_[level]);
+  });
+}
+
+void GeometryStore::want(std::span<const std::uint32_t> levels) {
+  wanted_.clear();
+  const auto add = [this](std::uint32_t number) {
+    if (!there(range(number))) wanted_.push_back(number);
+  };
+  for (std::size_t i = levels.size(); i-- > 0;) {
+    add(static_cast<std::uint32_t>(vertex_ranges_.size()) + levels[i]);
+    add(level_vertices_[levels[i]]);
+  }
+}
+
+std::uint32_t GeometryStore::open_wanted(GlState& gl, bool& indices, std::uint64_t& offset,
+                                         std::uint64_t& size) {
+  for (; !wanted_.empty(); wanted_.pop_back()) {
+    const std::uint32_t number = wanted_.back();
+    Range& next = range(number);
+    if (next.buffer != 0) continue;
+    if (resident_bytes_ + next.size > budget_ && !evict(next.size, gl)) return kNone;
+    indices = next.layout == kNone;
+    const GLenum target = indices ? GL_ELEMENT_ARRAY_BUFFER : GL_ARRAY_BUFFER;
+    next.buffer = make_buffer(target);
+    glBufferData(target, static_cast<GLsizeiptr>(next.size), nullptr, GL_STATIC_DRAW);
+    next.last_used = kOpen;
+    resident_bytes_ += next.gpu_size;
+    open_.push_back(number);
+    offset = next.source;
+    size = next.size;
+    return number;
+  }
+  return kNone;
+}
+
+void GeometryStore::have(std::uint32_t number) {
+  const auto found = std::find(open_.begin(), open_.end(), number);
+  if (found == open_.end()) return;
+  open_.erase(found);
+  range(number).last_used = frame_;
+}
+
+void GeometryStore::put_open(bool indices, std::uint64_t offset, std::span<const std::byte> bytes) {
+  const GLenum target = indices ? GL_ELEMENT_ARRAY_BUFFER : GL_ARRAY_BUFFER;
+  for (const std::uint32_t number : open_) {
+    const Range& to = range(number);
+    if ((to.layout == kNone) != indices) continue;
+    const Overlap part = overlap(to.source, to.size, offset, bytes);
+    if (part.bytes.empty()) continue;
+    glBindBuffer(target, to.buffer);
+    glBufferSubData(target, static_cast<GLintptr>(part.at),
+                    static_cast<GLsizeiptr>(part.bytes.size()), part.bytes.data());
+    uploaded_bytes_ += part.bytes.size();
+  }
+}
+
 void GeometryStore::put(bool indices, std::uint64_t offset, std::span<const std::byte> bytes) {
+  if (streams_) return put_open(indices, offset, bytes);
   const GLenum target = indices ? GL_ELEMENT_ARRAY_BUFFER : GL_ARRAY_BUFFER;
   glBindBuffer(target, indices ? whole_indices_ : whole_vertices_);
   glBufferSubData(target, static_cast<GLintptr>(offset), static_cast<GLsizeiptr>(bytes.size()),
@@ -209,7 +297,7 @@ bool GeometryStore::fits(std::span<const std::uint32_t> levels) {
     }
     bytes += index_ranges_[level].gpu_size;
   }
-  return bytes <= budget_;
+  return bytes <= list_budget_;
 }
 
 bool GeometryStore::use(std::uint32_t level, GlState& gl, LevelPlace& place) {
@@ -268,7 +356,7 @@ bool GeometryStore::evict(std::uint64_t bytes, GlState& gl) {
     Range* oldest = nullptr;
     for (std::vector<Range>* ranges : {&vertex_ranges_, &index_ranges_}) {
       for (Range& range : *ranges) {
-        if (range.buffer == 0 || range.last_used == frame_) continue;
+        if (range.buffer == 0 || range.last_used >= frame_) continue;
         if (oldest == nullptr || range.last_used < oldest->last_used) oldest = &range;
       }
     }

@@ -35,7 +35,23 @@ class GeometryStore {
   /// In place of upload(), where the bytes come later: makes the buffers for put(). Errors:
   /// kUnsupported "gl.halves" where vertices would have to be rewritten on their way.
   Result<void> expect();
-  /// Bytes of the section of indices or vertices from `offset` on, once expect() has made room.
+  /// In place of upload(), where bytes come when want() asks for them: levels that shown_geometry()
+  /// names are in the bundle's bytes, and uploaded when they are used; use() is for those that are
+  /// there(). fits() is for two thirds of the budget, so that what is drawn leaves room for what is
+  /// wanted. Errors: as expect().
+  Result<void> expect_wanted();
+  /// After expect_wanted(): whether these levels can be used.
+  [[nodiscard]] bool there(std::span<const std::uint32_t> levels) const;
+  /// What of these levels is not there is asked for from now on, in their order, and nothing else.
+  void want(std::span<const std::uint32_t> levels);
+  /// Makes room for the next range that is wanted; kNone: nothing is, or this frame uses the whole
+  /// budget. The range's number is for have(), its bytes are told from the start of their section.
+  std::uint32_t open_wanted(GlState& gl, bool& indices, std::uint64_t& offset, std::uint64_t& size);
+  /// All bytes of an open range were put().
+  void have(std::uint32_t range);
+
+  /// Bytes of the section of indices or vertices from `offset` on, once expect() has made room;
+  /// after expect_wanted(), what of them lies in open ranges.
   void put(bool indices, std::uint64_t offset, std::span<const std::byte> bytes);
   /// In place of upload(), where not all bytes are there: levels are uploaded when they are used.
   void upload_when_used();
@@ -71,9 +87,23 @@ class GeometryStore {
     std::uint64_t gpu_offset = 0;
     std::uint32_t layout = kNone;  ///< kNone: indices
     GLuint buffer = 0;
-    std::uint64_t last_used = 0;  ///< frame
+    std::uint64_t last_used = 0;  ///< frame; kOpen: bytes of it still come
+    bool kept = false;            ///< in the bundle's bytes, all of it
   };
 
+  /// Later than all frames, so that it is not evicted.
+  static constexpr std::uint64_t kOpen = ~std::uint64_t{0};
+
+  /// Vertex ranges, then index ranges.
+  [[nodiscard]] Range& range(std::uint32_t number) {
+    const std::size_t vertices = vertex_ranges_.size();
+    return number < vertices ? vertex_ranges_[number] : index_ranges_[number - vertices];
+  }
+  [[nodiscard]] static bool there(const Range& range) {
+    return range.kept || (range.buffer != 0 && range.last_used != kOpen);
+  }
+  void find_kept(bool indices);
+  void put_open(bool indices, std::uint64_t offset, std::span<const std::byte> bytes);
   void collect_ranges();
   void merge_vertex_ranges();
   [[nodiscard]] bool indices_valid(std::uint32_t level) const;
@@ -89,8 +119,11 @@ class GeometryStore {
   std::vector<std::uint32_t> level_vertices_;  ///< level to vertex range
   std::vector<std::uint32_t> counted_;         ///< of each vertex range: when fits() last saw it
   std::uint32_t counts_ = 0;
-  std::vector<std::byte> scratch_;  ///< rewritten vertices on their way
+  std::vector<std::byte> scratch_;     ///< rewritten vertices on their way
+  std::vector<std::uint32_t> wanted_;  ///< ranges, the next one last
+  std::vector<std::uint32_t> open_;    ///< ranges
   std::uint64_t budget_ = 0;
+  std::uint64_t list_budget_ = 0;  ///< of fits()
   std::uint64_t vertex_total_ = 0;
   std::uint64_t index_total_ = 0;
   std::uint64_t resident_bytes_ = 0;

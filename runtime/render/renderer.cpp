@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <utility>
 
@@ -165,6 +166,22 @@ struct Renderer::State {
     return finish_upload();
   }
 
+  /// In place of upload(): what is put() when it is wanted.
+  Result<void> expect_wanted() {
+    if (!caps.es3) {
+      return fail(ExitCode::kUnsupported, "gl.levels", "textures",
+                  "this context draws no texture without all of its levels",
+                  "keep the whole bundle in memory");
+    }
+    extensions = load_gl_extensions(caps);
+    const SavedGlState saved(extensions, !options.exclusive_context);
+    MODAR_TRY(geometry.expect_wanted());
+    MODAR_TRY(textures.expect_wanted(std::max<std::uint64_t>(1, caps.gpu_memory / 2)));
+    painter.make_no_batches();
+    draw_what_is_there = &State::use_what_is_there;
+    return finish_upload();
+  }
+
   Result<void> finish_upload() {
     MODAR_TRY(painter.create(textures, extensions, caps));
     MODAR_TRY(background.create());
@@ -222,17 +239,45 @@ struct Renderer::State {
     float pixels = options.lod_pixels;
     for (int i = coarser ? 0 : kCoarser + 1;; ++i) {
       list.build(bundle, painter.setups(), projection, height, items, pixels);
-      if (i > kCoarser || list_fits()) return;
+      if (i > kCoarser || list_fits()) break;
       pixels = i < kCoarser || !geometry.streams() ? 4.0f * pixels : options.lod_pixels;
     }
+    if (draw_what_is_there != nullptr)
+      (this->*draw_what_is_there)(projection, height, items, pixels);
+  }
+
+  /// The list has what is to be drawn where all is there. What differs most is asked for first, so
+  /// that a view gets better step by step.
+  void use_what_is_there(const glm::mat4& projection, int height, std::span<const DrawItem> items,
+                         float pixels) {
+    list_levels();
+    if (geometry.there(levels)) {
+      geometry.want({});
+      stats.lod_error = list.greatest_error(bundle);
+      return;
+    }
+    for (int i = kCoarser; i >= 0; --i) {
+      const float coarse = std::ldexp(pixels, 2 * i);
+      list.build(bundle, painter.setups(), projection, height, items, coarse);
+      list.sort_by_distance();
+      list_levels();
+      if (!geometry.there(levels)) break;
+    }
+    geometry.want(levels);
+    list.build_of(geometry, bundle, painter.setups(), projection, height, items, pixels);
+    stats.lod_error = list.greatest_error(bundle);
+  }
+
+  void list_levels() {
+    levels.clear();
+    for (const DrawCommand& command : list.commands()) levels.push_back(command.level);
   }
 
   bool list_fits() {
     const std::uint64_t most = caps.es3 ? kMostTriangles : kFewTriangles;
     if (list.cost(bundle, 0, list.commands().size()) > most) return false;
     if (!geometry.streams() || bundle.stand_ins().empty()) return true;
-    levels.clear();
-    for (const DrawCommand& command : list.commands()) levels.push_back(command.level);
+    list_levels();
     return geometry.fits(levels);
   }
 
@@ -269,6 +314,9 @@ struct Renderer::State {
   Target target;
   DrawList list;
   std::vector<std::uint32_t> levels;  ///< of the list
+  /// After expect_wanted(): use_what_is_there(), which programs of whole bundles do not link.
+  void (State::*draw_what_is_there)(const glm::mat4&, int, std::span<const DrawItem>,
+                                    float) = nullptr;
   RenderOptions options;
   RenderStats stats;
   std::uint64_t uploaded_before = 0;
@@ -282,16 +330,52 @@ Result<std::unique_ptr<Renderer>> Renderer::create(const BundleView& bundle, con
 }
 
 Result<std::unique_ptr<Renderer>> Renderer::create_part(const BundleView& bundle,
-                                                        const GlCaps& caps, bool comes) {
+                                                        const GlCaps& caps, Part part) {
   std::unique_ptr<Renderer> renderer(new Renderer(std::make_unique<State>(bundle, caps)));
-  if (!comes) renderer->state_->geometry.upload_when_used();
-  MODAR_TRY(comes ? renderer->state_->expect() : renderer->state_->upload());
+  State& state = *renderer->state_;
+  if (part == Part::kCoarsest) state.geometry.upload_when_used();
+  MODAR_TRY(part == Part::kCoarsest ? state.upload()
+            : part == Part::kComes  ? state.expect()
+                                    : state.expect_wanted());
   return renderer;
+}
+
+Renderer::Wanted Renderer::open_wanted() {
+  State& s = *state_;
+  const SavedGlState saved(s.extensions, !s.options.exclusive_context);
+  Wanted wanted;
+  std::span<const std::byte> section;
+  wanted.number = s.textures.want(wanted.offset, wanted.size);
+  if (wanted.number != kNone) {
+    section = s.bundle.texture_data(wanted.number);
+    wanted.number += s.bundle.levels().size() * 2;
+  } else {
+    bool indices = false;
+    wanted.number = s.geometry.open_wanted(s.gl, indices, wanted.offset, wanted.size);
+    section = indices ? s.bundle.indices() : s.bundle.vertices();
+  }
+  wanted.offset += static_cast<std::uint64_t>(section.data() - s.bundle.bytes().data());
+  s.gl.reset();
+  return wanted;
+}
+
+void Renderer::have(std::uint32_t number) {
+  State& s = *state_;
+  const SavedGlState saved(s.extensions, !s.options.exclusive_context);
+  if (number < s.bundle.levels().size() * 2) {
+    s.geometry.have(number);
+  } else {
+    s.textures.have();
+  }
+  s.gl.reset();
 }
 
 void Renderer::put(std::uint64_t offset, std::span<const std::byte> bytes) {
   State& s = *state_;
-  const SavedGlState saved(s.extensions, true);
+  // Another renderer draws while this one's bytes come; asking a browser for all of the state waits
+  // for its GPU, which a frame has no time for.
+  const bool alone = s.draw_what_is_there != nullptr && s.options.exclusive_context;
+  const SavedGlState saved(s.extensions, !alone);
   const auto start = [&](std::span<const std::byte> section) {
     return static_cast<std::uint64_t>(section.data() - s.bundle.bytes().data());
   };

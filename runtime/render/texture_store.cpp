@@ -115,8 +115,9 @@ Result<void> TextureStore::upload(std::uint64_t budget) {
   for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) {
     if (!used_[t]) continue;
     expect_reading(bundle_.texture_data(t));
-    colours_[t] = make(t, false);
-    if ((bundle_.textures()[t].flags & kTextureAlpha) != 0) alphas_[t] = make(t, true);
+    const std::uint32_t first = first_level_[t];
+    colours_[t] = make(t, false, first);
+    if ((bundle_.textures()[t].flags & kTextureAlpha) != 0) alphas_[t] = make(t, true, first);
   }
   decoded_ = {};
   return {};
@@ -138,11 +139,10 @@ GLuint TextureStore::begin(const TextureRecord& record) {
   return id;
 }
 
-GLuint TextureStore::make(std::uint32_t texture, bool alpha) {
+GLuint TextureStore::make(std::uint32_t texture, bool alpha, std::uint32_t first) {
   const TextureRecord& record = bundle_.textures()[texture];
   const std::span<const std::byte> data = bundle_.texture_data(texture);
   const GLuint id = begin(record);
-  const std::uint32_t first = first_level_[texture];
   const std::uint32_t end = mipmapped(record) ? record.level_count : first + 1;
   for (std::uint32_t i = first; i < end; ++i) {
     const TextureLevelRecord& level = bundle_.texture_levels()[record.first_level + i];
@@ -188,6 +188,54 @@ Result<void> TextureStore::expect(std::uint64_t budget) {
   return {};
 }
 
+Result<void> TextureStore::expect_wanted(std::uint64_t budget) {
+  MODAR_TRY(choose_levels(budget));
+  shown_ = first_level_;
+  for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) {
+    if (!used_[t]) continue;
+    const TextureRecord& record = bundle_.textures()[t];
+    if (mipmapped(record)) shown_[t] = std::max(shown_[t], first_shown_level(bundle_, record));
+    colours_[t] = make(t, false, shown_[t]);
+    if ((record.flags & kTextureAlpha) != 0) alphas_[t] = make(t, true, shown_[t]);
+    show(t);
+  }
+  decoded_ = {};
+  return {};
+}
+
+void TextureStore::show(std::uint32_t texture) const {
+  constexpr GLenum kBaseLevel = 0x813C;  // of ES 3
+  for (const GLuint name : {colours_[texture], alphas_[texture]}) {
+    if (name == 0) continue;
+    glBindTexture(GL_TEXTURE_2D, name);
+    glTexParameteri(GL_TEXTURE_2D, kBaseLevel,
+                    static_cast<GLint>(shown_[texture] - first_level_[texture]));
+  }
+}
+
+void TextureStore::have() {
+  --shown_[wanted_];
+  show(wanted_);
+  wanted_ = kNone;
+}
+
+std::uint32_t TextureStore::want(std::uint64_t& offset, std::uint64_t& size) {
+  if (wanted_ != kNone) return kNone;
+  for (std::uint32_t t = 0; t < shown_.size(); ++t) {
+    if (!used_[t] || shown_[t] == first_level_[t]) continue;
+    const TextureLevelRecord& level =
+        bundle_.texture_levels()[bundle_.textures()[t].first_level + shown_[t] - 1];
+    const bool twin = level.alpha_offset != kNoOffset;
+    const std::uint64_t from = twin ? std::min(level.offset, level.alpha_offset) : level.offset;
+    const std::uint64_t to = twin ? std::max(level.offset, level.alpha_offset) : level.offset;
+    if (wanted_ != kNone && to + level.size - from >= size) continue;
+    wanted_ = t;
+    offset = from;
+    size = to + level.size - from;
+  }
+  return wanted_;
+}
+
 void TextureStore::put(std::uint32_t texture, std::uint64_t offset,
                        std::span<const std::byte> bytes) {
   if (!used_[texture]) return;
@@ -200,6 +248,7 @@ void TextureStore::put(std::uint32_t texture, std::uint64_t offset,
       const std::uint64_t start = alpha ? level.alpha_offset : level.offset;
       const GLuint name = alpha ? alphas_[texture] : colours_[texture];
       if (name == 0 || start == kNoOffset) continue;
+      if (!shown_.empty() && (texture != wanted_ || i + 1 != shown_[texture])) continue;
       const Overlap part = overlap(start, level.size, offset, bytes);
       if (!part.bytes.empty()) take(texture, name, i, part.at, part.bytes);
     }
@@ -213,21 +262,20 @@ void TextureStore::take(std::uint32_t texture, GLuint name, std::uint32_t level,
   auto coming = std::find_if(coming_.begin(), coming_.end(), [&](const Coming& each) {
     return each.name == name && each.level == level;
   });
-  if (coming == coming_.end()) {
-    if (at != 0) return;  // its start is missing
-    coming = coming_.insert(coming_.end(), Coming{name, level, {}});
-    if (bytes.size() < size) coming->bytes.reserve(static_cast<std::size_t>(size));
-  }
-  if (coming->bytes.size() != at) return;
   std::span<const std::byte> blocks = bytes;
   if (bytes.size() < size) {
-    coming->bytes.insert(coming->bytes.end(), bytes.begin(), bytes.end());
-    if (coming->bytes.size() < size) return;
+    if (coming == coming_.end()) {
+      coming = coming_.insert(coming_.end(), Coming{name, level, 0, {}});
+      coming->bytes.resize(static_cast<std::size_t>(size));
+    }
+    std::copy(bytes.begin(), bytes.end(), coming->bytes.begin() + static_cast<std::ptrdiff_t>(at));
+    coming->came += bytes.size();
+    if (coming->came < size) return;
     blocks = coming->bytes;
   }
   glBindTexture(GL_TEXTURE_2D, name);
   send(texture, level, blocks);
-  coming_.erase(coming);
+  if (coming != coming_.end()) coming_.erase(coming);
   decoded_ = {};
 }
 

@@ -25,8 +25,16 @@ class TextureStore {
   /// In place of upload(), where the blocks come later: makes the textures for put(). Errors: as
   /// upload().
   Result<void> expect(std::uint64_t budget);
+  /// In place of upload(), where levels that first_shown_level() leaves out come when want() asks
+  /// for them. Needs ES 3. Errors: as upload().
+  Result<void> expect_wanted(std::uint64_t budget);
+  /// After expect_wanted(): the smallest level that is missing, as bytes of its texture's section,
+  /// which put() takes until have(). Answers the texture; kNone: all are there, or one is awaited.
+  std::uint32_t want(std::uint64_t& offset, std::uint64_t& size);
+  /// All bytes of what want() named were put(): it is drawn from now on.
+  void have();
   /// Bytes of a texture's section from `offset` on. A level is uploaded when its last byte is here;
-  /// until then its bytes, which come in their order, are kept.
+  /// until then its bytes are kept, each of which comes once.
   void put(std::uint32_t texture, std::uint64_t offset, std::span<const std::byte> bytes);
   void release(GlState& gl);
 
@@ -49,7 +57,9 @@ class TextureStore {
   Result<void> choose_levels(std::uint64_t budget);
   /// A texture without levels, bound.
   GLuint begin(const TextureRecord& texture);
-  GLuint make(std::uint32_t texture, bool alpha);
+  GLuint make(std::uint32_t texture, bool alpha, std::uint32_t first);
+  /// Of this texture, levels from shown_ on are there.
+  void show(std::uint32_t texture) const;
   /// Uploads a level (counted from the bundle's finest) to the texture that is bound.
   void send(std::uint32_t texture, std::uint32_t level, std::span<const std::byte> blocks);
 
@@ -57,6 +67,7 @@ class TextureStore {
   struct Coming {
     GLuint name = 0;
     std::uint32_t level = 0;
+    std::uint64_t came = 0;
     std::vector<std::byte> bytes;
   };
   /// Some bytes of a level from `at` on, of its texture `name`.
@@ -75,6 +86,8 @@ class TextureStore {
   std::vector<Rgb8> means_;
   std::vector<std::uint8_t> decoded_;
   std::vector<Coming> coming_;
+  std::vector<std::uint32_t> shown_;  ///< after expect_wanted(): the finest level that is there
+  std::uint32_t wanted_ = kNone;      ///< texture
   std::uint64_t bytes_ = 0;
   std::uint64_t uploaded_bytes_ = 0;
 };

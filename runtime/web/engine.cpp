@@ -269,7 +269,7 @@ EMSCRIPTEN_KEEPALIVE int web_begin_rest(int in_order) {
   if (!kept) return failed(kept.error());
   modar_renderer_destroy(engine.coming);
   // Null where vertices have to be rewritten for this context: then all stays in memory.
-  engine.coming = modar_renderer_create_part(engine.bundle, 1, nullptr);
+  engine.coming = modar_renderer_create_part(engine.bundle, 1, 0, nullptr);
   take_context_back();
   if (in_order != 0) return 0;
   for (const modar::StageRange& range : engine.arriving->kept()) {
@@ -290,11 +290,55 @@ EMSCRIPTEN_KEEPALIVE int web_pass(double at, const void* bytes, size_t size) {
   const auto passed = engine.arriving->pass(offset, some);
   return passed ? 0 : failed(passed.error());
 }
+/// What web_kept() names has to come before web_show_wanted().
+EMSCRIPTEN_KEEPALIVE int web_keep() {
+  const AllShown shown;
+  const auto kept = engine.arriving->keep(false);
+  return kept ? 0 : failed(kept.error());
+}
+/// Bytes of the bundle: the first one and how many; null: no more.
+EMSCRIPTEN_KEEPALIVE const uint32_t* web_kept(uint32_t index) {
+  static uint32_t range[2];
+  const auto kept = engine.arriving->kept();
+  if (index == kept.size()) return nullptr;
+  range[0] = static_cast<uint32_t>(kept[index].offset);
+  range[1] = static_cast<uint32_t>(kept[index].size);
+  return range;
+}
+/// From now on the finest is drawn that web_open_wanted() has brought, within so many bytes of the
+/// GPU. fixed: see use_renderer().
+EMSCRIPTEN_KEEPALIVE int web_show_wanted(double gpu_bytes, int fixed) {
+  engine.arriving->show_all();
+  const auto verified = engine.arriving->verify();
+  if (!verified) return failed(verified.error());
+  const auto bytes = static_cast<uint64_t>(gpu_bytes);
+  return use_renderer(modar_renderer_create_part(engine.bundle, 2, bytes, &engine.error), fixed);
+}
+/// Bytes of the bundle that the last picture lacks, which web_fill() is given: number, the first
+/// byte, how many; null: none.
+EMSCRIPTEN_KEEPALIVE const uint32_t* web_open_wanted() {
+  static uint32_t wanted[3];
+  uint64_t offset = 0;
+  uint64_t size = 0;
+  wanted[0] = modar_renderer_open_wanted(engine.renderer, &offset, &size);
+  wanted[1] = static_cast<uint32_t>(offset);
+  wanted[2] = static_cast<uint32_t>(size);
+  return wanted[0] == 0 ? nullptr : wanted;
+}
+EMSCRIPTEN_KEEPALIVE void web_fill(double at, const void* bytes, size_t size) {
+  const auto offset = static_cast<uint64_t>(at);
+  modar_renderer_put(engine.renderer, offset, bytes, size);
+  static_cast<void>(engine.arriving->pass(offset, {static_cast<const std::byte*>(bytes), size}));
+}
+/// All bytes of that number have been given.
+EMSCRIPTEN_KEEPALIVE void web_have(uint32_t number) {
+  modar_renderer_have(engine.renderer, number);
+}
 /// From now on the coarsest of everything is drawn, which has come. fixed: see use_renderer().
 EMSCRIPTEN_KEEPALIVE int web_show_coarse(int fixed) {
   const auto shown = engine.arriving->show_coarsest();
   if (!shown) return failed(shown.error());
-  return use_renderer(modar_renderer_create_part(engine.bundle, 0, &engine.error), fixed);
+  return use_renderer(modar_renderer_create_part(engine.bundle, 0, 0, &engine.error), fixed);
 }
 /// From now on all of it is drawn, which has come.
 EMSCRIPTEN_KEEPALIVE int web_show_all(int fixed) {
@@ -669,6 +713,9 @@ EMSCRIPTEN_KEEPALIVE const float* web_label(uint32_t node, int width, int height
   return place;
 }
 
+EMSCRIPTEN_KEEPALIVE float web_lod_error() {
+  return modar_renderer_lod_error(engine.renderer);
+}
 EMSCRIPTEN_KEEPALIVE double web_gpu_bytes() {
   return static_cast<double>(modar_renderer_gpu_bytes(engine.renderer));
 }

@@ -1,6 +1,7 @@
 // A bundle whose vertices, indices and blocks pass by on their way to the GPU: drawn as one in
 // memory.
 #include <cstring>
+#include <optional>
 
 #include <gtest/gtest.h>
 #include <glm/gtc/matrix_transform.hpp>
@@ -36,16 +37,17 @@ std::vector<std::byte> blocks_of(std::uint32_t side, unsigned seed) {
   return blocks;
 }
 
-/// Two chunks with a stand-in of one, and a textured square of levels with alpha.
-BundleContent two_kinds() {
+/// Two chunks with a stand-in of one, and a textured square of levels with alpha, so many texels
+/// wide.
+BundleContent two_kinds(std::uint32_t texels = 16) {
   SceneMaker maker;
   std::vector<std::vector<std::byte>> colour;
   std::vector<std::vector<std::byte>> alpha;
-  for (std::uint32_t side = 16, seed = 1; side > 0; side /= 2, ++seed) {
+  for (std::uint32_t side = texels, seed = 1; side > 0; side /= 2, ++seed) {
     colour.push_back(blocks_of(side, seed));
     alpha.push_back(blocks_of(side, seed + 9));
   }
-  const std::uint32_t texture = maker.add_texture(16, colour, alpha, kTextureAlpha);
+  const std::uint32_t texture = maker.add_texture(texels, colour, alpha, kTextureAlpha);
   MaterialRecord seen = flat_material();
   seen.texture = texture;
   const std::uint32_t material = maker.add_material(seen);
@@ -109,14 +111,14 @@ TEST_F(ComingTest, IsDrawnAsIfItWereInMemory) {
   ASSERT_FALSE(std::equal(whole.begin(), whole.end(), bytes.begin())) << "something passes by";
   // Pieces that end within a vertex, a block, a level; and all of it at once.
   for (const std::size_t piece : {std::size_t{7}, std::size_t{101}, whole.size()}) {
-    auto renderer = Renderer::create_part(memory.view, probe_gl_caps(), true);
+    auto renderer = Renderer::create_part(memory.view, probe_gl_caps(), Renderer::Part::kComes);
     ASSERT_TRUE(renderer) << renderer.error().cause;
     for (std::size_t at = static_cast<std::size_t>(start); at < whole.size(); at += piece) {
       (*renderer)->put(at, whole.subspan(at, std::min(piece, whole.size() - at)));
     }
     EXPECT_TRUE(picture(**renderer) == wanted) << piece;
   }
-  auto empty = Renderer::create_part(memory.view, probe_gl_caps(), true);
+  auto empty = Renderer::create_part(memory.view, probe_gl_caps(), Renderer::Part::kComes);
   ASSERT_TRUE(empty);
   EXPECT_FALSE(picture(**empty) == wanted);
 }
@@ -125,7 +127,7 @@ TEST_F(ComingTest, VerticesThatWouldBeRewrittenAreRefused) {
   const MappedBundle bundle(two_kinds());
   GlCaps caps = probe_gl_caps();
   caps.half_float_vertices = false;
-  const auto refused = Renderer::create_part(*bundle.view, caps, true);
+  const auto refused = Renderer::create_part(*bundle.view, caps, Renderer::Part::kComes);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, "gl.halves");
 }
@@ -135,7 +137,7 @@ TEST_F(ComingTest, TheCoarsestIsUploadedWhenItIsDrawn) {
   const MappedBundle bundle(two_kinds());
   Memory memory(bundle.file.bytes());
   show_coarsest(memory.bytes(), memory.view);
-  auto renderer = Renderer::create_part(memory.view, probe_gl_caps(), false);
+  auto renderer = Renderer::create_part(memory.view, probe_gl_caps(), Renderer::Part::kCoarsest);
   ASSERT_TRUE(renderer) << renderer.error().cause;
   EXPECT_EQ((*renderer)->gpu_memory().geometry, 0u);
   const auto pixels = picture(**renderer);
@@ -148,6 +150,119 @@ TEST_F(ComingTest, TheCoarsestIsUploadedWhenItIsDrawn) {
     blue += pixels[i + 2] == 255 && pixels[i] == 0 ? 1 : 0;
   }
   EXPECT_GT(blue, 0);
+}
+
+/// A bundle that is larger than what a view may have: little of it is there, the rest comes when it
+/// is wanted.
+class WantedTest : public ComingTest {
+ protected:
+  void SetUp() override {
+    ComingTest::SetUp();
+    if (IsSkipped()) return;
+    if (!probe_gl_caps().es3) GTEST_SKIP() << "needs ES 3";
+    bundle.emplace(two_kinds(512));
+    ASSERT_TRUE(bundle->view);
+    whole = bundle->file.bytes();
+    memory.emplace(whole);
+    const auto bytes = memory->bytes();
+    std::fill(bytes.begin() + static_cast<std::ptrdiff_t>(gpu_start(memory->view)), bytes.end(),
+              std::byte{0});
+    for (const StageRange& range : kept_ranges(memory->view)) {
+      std::copy_n(whole.begin() + static_cast<std::ptrdiff_t>(range.offset), range.size,
+                  bytes.begin() + static_cast<std::ptrdiff_t>(range.offset));
+    }
+  }
+
+  std::unique_ptr<Renderer> start(std::uint64_t budget) {
+    GlCaps caps = probe_gl_caps();
+    caps.gpu_memory = budget;
+    auto renderer = Renderer::create_part(memory->view, caps, Renderer::Part::kWanted);
+    EXPECT_TRUE(renderer) << renderer.error().cause;
+    return renderer ? *std::move(renderer) : nullptr;
+  }
+
+  /// Puts what is wanted now, the end of each first; answers the bytes.
+  std::uint64_t bring(Renderer& renderer) {
+    std::uint64_t bytes = 0;
+    for (;;) {
+      const Renderer::Wanted wanted = renderer.open_wanted();
+      if (wanted.number == kNone) return bytes;
+      EXPECT_LE(wanted.offset + wanted.size, whole.size());
+      const std::uint64_t half = wanted.offset + wanted.size / 2;
+      renderer.put(half, whole.subspan(half, wanted.offset + wanted.size - half));
+      renderer.put(wanted.offset, whole.subspan(wanted.offset, half - wanted.offset));
+      renderer.have(wanted.number);
+      bytes += wanted.size;
+    }
+  }
+
+  std::optional<MappedBundle> bundle;
+  std::span<const std::byte> whole;
+  std::optional<Memory> memory;
+};
+
+int blue_pixels(std::span<const std::uint8_t> pixels) {
+  int blue = 0;
+  for (std::size_t i = 0; i < pixels.size(); i += 4) blue += pixels[i + 2] == 255 && pixels[i] == 0;
+  return blue;
+}
+
+TEST_F(WantedTest, AViewGetsBetterUntilItIsTheWholeBundles) {
+  const auto wanted = picture(*make_renderer(*bundle->view, probe_gl_caps()));
+  const auto renderer = start(64 << 20);
+  ASSERT_TRUE(renderer);
+  const auto first = picture(*renderer);
+  EXPECT_GT(blue_pixels(first), 0) << "the stand-in";
+  EXPECT_EQ(blue_pixels(wanted), 0);
+  std::uint64_t bytes = 0;
+  for (std::uint64_t more = 1; more > 0;) {
+    bytes += more = bring(*renderer);
+    picture(*renderer);
+  }
+  EXPECT_TRUE(picture(*renderer) == wanted);
+  EXPECT_EQ(bring(*renderer), 0u) << "nothing is asked for twice";
+  // The levels of 512 texels, twice, and the two chunks.
+  const std::uint64_t level = 128 * 128 * 8;
+  EXPECT_GE(bytes, 2 * level);
+  EXPECT_LT(bytes, 2 * level + bundle->view->vertices().size() + bundle->view->indices().size());
+}
+
+TEST_F(WantedTest, WhatIsOpenIsNotDrawn) {
+  const auto renderer = start(64 << 20);
+  ASSERT_TRUE(renderer);
+  const auto first = picture(*renderer);
+  int open = 0;
+  for (;;) {
+    const Renderer::Wanted wanted = renderer->open_wanted();
+    if (wanted.number == kNone) break;
+    ++open;
+    renderer->put(wanted.offset, whole.subspan(wanted.offset, wanted.size));
+  }
+  EXPECT_EQ(open, 5) << "a texture's level, and two chunks' vertices and indices";
+  EXPECT_TRUE(picture(*renderer) == first);
+}
+
+/// The budget is kept at every step, what is not seen makes room, and comes again.
+TEST_F(WantedTest, WithinABudget) {
+  const std::uint64_t geometry = bundle->view->vertices().size() + bundle->view->indices().size();
+  const std::uint64_t texture = 2 * (128 * 128 * 8);
+  const auto renderer = start(texture / 2);  // not the finest level
+  ASSERT_TRUE(renderer);
+  for (int i = 0; i < 8; ++i) {
+    picture(*renderer);
+    bring(*renderer);
+    const GpuMemory used = renderer->gpu_memory();
+    EXPECT_LE(used.geometry + used.textures + used.batches, texture / 2);
+  }
+  EXPECT_EQ(blue_pixels(picture(*renderer)), 0) << geometry << " bytes fit";
+}
+
+TEST_F(WantedTest, NeedsAContextThatDrawsTexturesInPart) {
+  GlCaps caps = probe_gl_caps();
+  caps.es3 = false;
+  const auto refused = Renderer::create_part(memory->view, caps, Renderer::Part::kWanted);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, "gl.levels");
 }
 
 }  // namespace

@@ -336,13 +336,21 @@ typedef struct modar_render_stats {
 modar_renderer* modar_renderer_create(const modar_bundle* bundle, const char* device,
                                       uint64_t gpu_bytes, modar_error* error);
 /* Of a bundle whose bytes are still coming, as Renderer::create_part() of modar/renderer.hpp.
- * comes: 0: only the coarsest is there; 1: modar_renderer_put() brings what
- * GPUs draw from. */
-MODAR_EXPERIMENTAL modar_renderer* modar_renderer_create_part(const modar_bundle* bundle, int comes,
+ * part: 0: only the coarsest is there; 1: modar_renderer_put() brings what GPUs draw from; 2: it
+ * brings what views need (modar_renderer_open_wanted()), within gpu_bytes of GL memory. */
+MODAR_EXPERIMENTAL modar_renderer* modar_renderer_create_part(const modar_bundle* bundle, int part,
+                                                              uint64_t gpu_bytes,
                                                               modar_error* error);
 /* Bytes of the bundle from `offset` on, which are uploaded and not kept. */
 MODAR_EXPERIMENTAL void modar_renderer_put(modar_renderer* renderer, uint64_t offset,
                                            const void* bytes, size_t size);
+/* Opens the next range that the last view lacks, for modar_renderer_put(): its number plus 1, for
+ * modar_renderer_have() when all of it was put; 0: nothing. */
+MODAR_EXPERIMENTAL uint32_t modar_renderer_open_wanted(modar_renderer* renderer, uint64_t* offset,
+                                                       uint64_t* byte_count);
+MODAR_EXPERIMENTAL void modar_renderer_have(modar_renderer* renderer, uint32_t number);
+/* The greatest error of what that renderer drew last, pixels on the screen. */
+MODAR_EXPERIMENTAL float modar_renderer_lod_error(const modar_renderer* renderer);
 void modar_renderer_destroy(modar_renderer* renderer);
 /* After a lost context, with the new one current: uploads everything again from the bundle's bytes.
  */

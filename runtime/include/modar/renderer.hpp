@@ -125,6 +125,8 @@ struct RenderStats {
   std::uint64_t triangles = 0;
   std::uint64_t bytes_uploaded = 0;  ///< background, uniforms and streamed buffers of this frame
   std::uint64_t evictions = 0;       ///< buffers that were evicted in this frame
+  /// Of Renderer::Part::kWanted: the greatest error of a level that was drawn, pixels.
+  float lod_error = 0.0f;
 };
 
 /// GL memory of the bundle.
@@ -208,15 +210,28 @@ class Renderer {
   /// least recently visible. The bundle's bytes must outlive the renderer. Errors:
   /// kUnsupported "gl.*".
   static Result<std::unique_ptr<Renderer>> create(const BundleView& bundle, const GlCaps& caps);
-  /// A renderer of a bundle of which not all bytes are there. comes = false: only the coarsest is,
-  /// and the bundle's tables say so (show_coarsest() of formats/transport/stages.hpp): what is
-  /// drawn is uploaded then. comes = true: put() brings vertices, indices and texture blocks, which
-  /// are not read from the bundle's bytes, except what kept_ranges() names there. To be drawn with
-  /// when all of them have come; nothing checks that indices are below their level's vertex count,
-  /// which contexts that bound what a draw call reads (WebGL) need not have. Errors: as create(),
-  /// and kUnsupported "gl.halves" where vertices that come would have to be rewritten.
+  /// What is there of a bundle of which not all bytes are.
+  enum class Part : std::uint8_t {
+    /// The coarsest of everything, and the bundle's tables say so (show_coarsest() of
+    /// formats/transport/stages.hpp): what is drawn is uploaded then.
+    kCoarsest,
+    /// put() brings vertices, indices and texture blocks, which are not read from the bundle's
+    /// bytes, except what kept_ranges() names there. To be drawn with when all of them have come.
+    kComes,
+    /// What kept_ranges() names, and more comes when a view needs it: for bundles that exceed the
+    /// memory. Each picture shows the finest that is there, of a model one stand-in or all chunks
+    /// that are seen, and decides what open_wanted() asks for: the coarsest of what it lacks, the
+    /// nearest first. What no picture shows any more makes room, the longest unseen first.
+    /// caps.gpu_memory: bytes, not 0; a view wants two thirds of it, so that what it shows
+    /// meanwhile has the rest.
+    kWanted,
+  };
+  /// A renderer of a part of a bundle. Nothing checks that indices which come are below their
+  /// level's vertex count, which contexts that bound what a draw call reads (WebGL) need not have.
+  /// Errors: as create(), and kUnsupported "gl.halves" where vertices that come would have to be
+  /// rewritten, "gl.levels" for kWanted without ES 3.
   static Result<std::unique_ptr<Renderer>> create_part(const BundleView& bundle, const GlCaps& caps,
-                                                       bool comes);
+                                                       Part part);
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
   ~Renderer();
@@ -259,6 +274,17 @@ class Renderer {
   /// Of create_part(): bytes of the bundle from `offset` on, which are uploaded and not kept.
   /// Each byte once; those of a texture in their order.
   void put(std::uint64_t offset, std::span<const std::byte> bytes);
+
+  /// Of Part::kWanted: bytes of the bundle that the last view lacks.
+  struct Wanted {
+    std::uint32_t number = kNone;  ///< for have(); kNone: it lacks nothing that there is room for
+    std::uint64_t offset = 0;      ///< in the bundle
+    std::uint64_t size = 0;
+  };
+  /// The next one, from now on open: put() takes its bytes, each once.
+  Wanted open_wanted();
+  /// All bytes of an open one were put().
+  void have(std::uint32_t number);
 
   /// Copies the picture, top row first, 4 bytes a pixel (RGBA). rgba.size() == width * height * 4.
   void read_pixels(std::span<std::uint8_t> rgba);
