@@ -31,7 +31,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// What is copied as it is; index.html, sw.js and the words are written with changes.
-constexpr std::array<std::string_view, 24> kPageFiles = {"app.js",
+constexpr std::array<std::string_view, 25> kPageFiles = {"app.js",
                                                          "engine-plain.js",
                                                          "engine-plain.wasm",
                                                          "engine-record-plain.js",
@@ -54,7 +54,8 @@ constexpr std::array<std::string_view, 24> kPageFiles = {"app.js",
                                                          "record-worker.js",
                                                          "room.svg",
                                                          "style.css",
-                                                         "viewer-words.js"};
+                                                         "viewer-words.js",
+                                                         "wanted.js"};
 /// Modules that app.js contains, for pages of one's own beside this one.
 constexpr std::array<std::string_view, 12> kModules = {
     "arrival.js",    "bundle.js",       "camera.js",       "gyroscope.js",

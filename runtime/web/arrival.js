@@ -186,6 +186,15 @@ export class Source {
     }
   }
 
+  /** Brings nothing more by itself. @returns {bundle, signal}: for requests of one's own, until close() */
+  leave() {
+    this.#reader?.cancel().catch(() => {});
+    this.#reader = null;
+    this.#chunk = new Uint8Array();
+    this.#endCopy(false);
+    return { bundle: this.#bundle, signal: this.#abort.signal };
+  }
+
   #endCopy(whole) {
     this.#copy?.end(whole);
     this.#copy = null;
@@ -250,6 +259,16 @@ export class RawArrival {
       this.#at += bytes.length;
     }
     this.close();
+  }
+
+  /** In place of bring(), for wanted.js: the last stage in parts that can be had by themselves. first: of those that have not come. */
+  parts() {
+    const pieces = [];
+    for (let at = this.#rest; at < this.size; at += PASSED) {
+      const size = Math.min(PASSED, this.size - at);
+      pieces.push({ at, stored: size, offset: at, size });
+    }
+    return { ...this.#source.leave(), pieces, first: 0, decode: async (_, bytes) => bytes };
   }
 
   /** The same again, for the last stage. */
@@ -353,6 +372,12 @@ export class Arrival {
     if (this.#next < this.#pieces.length) return;
     await this.#source.take(1, false).catch(() => {});  // to its end: then the browser keeps it
     this.close(true);
+  }
+
+  /** In place of bring(), for wanted.js: parts that can be had by themselves. first: of those that have not come. */
+  parts() {
+    const decode = async ({ index, size }, stored) => (await this.#decoder.ask({ type: 'piece', index, stored, size })).bytes;
+    return { ...this.#source.leave(), pieces: this.#pieces, first: this.#next, decode };
   }
 
   /** The same again, for the last stage. */

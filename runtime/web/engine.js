@@ -69,7 +69,12 @@ export class Engine {
     return new Engine(await load(STRANDED ? { locateFile: strandedFile } : {}), kind);
   }
 
-  #check(status) {
+  /** For wanted.js: what most pages do not load. */
+  get module() {
+    return this.#module;
+  }
+
+  check(status) {
     if (status === 0) return;
     const text = (field) => this.#module.UTF8ToString(this.#module._web_error(field));
     throw new ModarError({ code: text(0), where: text(1), cause: text(2), cure: text(3) });
@@ -102,23 +107,23 @@ export class Engine {
 
   /** Before pass(), in the context that is current. inOrder: bytes come as in a file; else what showCoarse() shows is there. */
   beginRest(inOrder) {
-    this.#check(this.#module._web_begin_rest(inOrder ? 1 : 0));
+    this.check(this.#module._web_begin_rest(inOrder ? 1 : 0));
   }
 
   /** Takes bytes that are drawn from to the GPU, and keeps what the engine itself reads. */
   pass(offset, bytes) {
     this.frameBuffer(bytes.length).set(bytes);
-    this.#check(this.#module._web_pass(offset, this.frameAt, bytes.length));
+    this.check(this.#module._web_pass(offset, this.frameAt, bytes.length));
   }
 
   /** Draws the coarsest of everything from now on. fixedLight: the models' light does not follow look(). */
   showCoarse(fixedLight) {
-    this.#check(this.#module._web_show_coarse(fixedLight ? 1 : 0));
+    this.check(this.#module._web_show_coarse(fixedLight ? 1 : 0));
   }
 
   /** Draws what pass() took from now on, which is verified. */
   showAll(fixedLight) {
-    this.#check(this.#module._web_show_all(fixedLight ? 1 : 0));
+    this.check(this.#module._web_show_all(fixedLight ? 1 : 0));
   }
 
   /** The bundle, a view until the heap grows: what pass() took is missing in part. */
@@ -130,7 +135,7 @@ export class Engine {
   recipe(bytes) {
     const at = this.#reserve(bytes.length);
     this.#module.HEAPU8.set(bytes, at);
-    this.#check(this.#module._web_recipe(at, bytes.length));
+    this.check(this.#module._web_recipe(at, bytes.length));
   }
 
   /** Some of a tracker record's `stored` bytes have come: decode() has less to do. */
@@ -143,13 +148,13 @@ export class Engine {
   decode(index, stored, size) {
     this.frameBuffer(stored.length).set(stored);
     const at = this.#module._web_piece(index, this.frameAt);
-    if (at === 0) this.#check(1);
+    if (at === 0) this.check(1);
     return this.#module.HEAPU8.slice(at, at + size);
   }
 
   #open() {
     const m = this.#module;
-    this.#check(m._web_open());
+    this.check(m._web_open());
     this.patterns = Array.from({ length: m._web_pattern_count() }, (_, i) => ({
       name: m.UTF8ToString(m._web_pattern_name(i)), widthMm: m._web_pattern_width_mm(i),
     }));
@@ -263,7 +268,7 @@ export class Engine {
 
   /** Starts tracking anew for the camera. */
   track(findFocal, budget = 0, extended = false) {
-    this.#check(this.#module._web_track(findFocal ? 1 : 0, budget, extended ? 1 : 0));
+    this.check(this.#module._web_track(findFocal ? 1 : 0, budget, extended ? 1 : 0));
   }
 
   reset() {
@@ -293,7 +298,7 @@ export class Engine {
   /** Takes a record as a further pattern. @param {Uint8Array} record */
   addPattern(record, pattern) {
     this.frameBuffer(record.length).set(record);
-    this.#check(this.#module._web_add_pattern(this.frameAt, record.length));
+    this.check(this.#module._web_add_pattern(this.frameAt, record.length));
     this.patterns.push(pattern);
   }
 
@@ -322,7 +327,7 @@ export class Engine {
 
   /** Tracks the gray frame in the frame buffer. @returns poses, a view that the next call changes. */
   step(stride, time) {
-    this.#check(this.#module._web_step(this.frameAt, stride, time));
+    this.check(this.#module._web_step(this.frameAt, stride, time));
     return this.poses();
   }
 

@@ -24,16 +24,19 @@ export interface SceneNode {
  * Scenes may act (nodes and actions of the bundle). Events: `text`, detail {node}: the words of a label are to be shown; `link`,
  * detail {address}: the visitor is to be asked whether to open it; `caption`, detail {node, text, language}: the words that are
  * heard now of a video or sound, '' for none; `drawn`: labels() has changed; `refined`: of a packed bundle, first the coarsest of everything
- * can be drawn, then all.
+ * can be drawn, then all; of one that is larger than maxBytes, a finer picture than before.
  */
 export class View extends EventTarget {
   /**
    * bundle: bytes of a raw one, or what load() answers, which also takes packed bundles; both may still be on their way. What is drawn
    * from goes to the GPU and is not kept: after a lost context it is asked for again, where load() was given an address. picture, models: laid over each other by the page, of one size.
    * fixedLight: the models' light does not follow the camera's picture. webgl1: for tests. Errors: ModarError.
+   * maxBytes (64 MB): of a bundle that is larger, no more than these are on the GPU at once; levels of detail and of textures come by
+   * ranges of the file when a picture needs them, the coarse ones first, and what is not seen makes room. Of models, bakes with --no-lods
+   * have one level, which is always there. A host without ranges, or a browser without WebGL 2, has all of it at once. 0: no limit.
    */
   static create(bundle: Modar | Uint8Array | Promise<Modar | Uint8Array>, options: {
-    picture: HTMLCanvasElement; models: HTMLCanvasElement; simd?: boolean; webgl1?: boolean; fixedLight?: boolean;
+    picture: HTMLCanvasElement; models: HTMLCanvasElement; simd?: boolean; webgl1?: boolean; fixedLight?: boolean; maxBytes?: number;
   }): Promise<View>;
   /** The picture alone, of a frame that nothing is known of. */
   show(source: VideoFrame | HTMLCanvasElement, gesture?: Gesture): void;
@@ -86,4 +89,6 @@ export class View extends EventTarget {
   readonly webgl: 1 | 2;
   readonly heapBytes: number;
   readonly gpuBytes: number;
+  /** Of a bundle that is larger than maxBytes: the greatest error of a level that was drawn last, pixels of the canvas. */
+  readonly lodError: number;
 }

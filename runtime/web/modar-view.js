@@ -8,6 +8,8 @@ import { drawFrame, fitCanvases } from './modar.js';
 const LIGHT_EVERY = 4;
 /** Drawings between looks at whether a label is covered: one label a look, since that reads a model's triangles. */
 const COVER_EVERY = 6;
+/** Of a bundle that is larger, a view has so many bytes on the GPU at once: what phones with little memory give a page. Set by hand. */
+const MOST_BYTES = 64 << 20;
 /** Milliseconds without a frame after which what turns by itself is drawn without one. */
 const STILL_MS = 60;
 const LIGHT_WIDTH = 160;
@@ -56,6 +58,9 @@ export class View extends EventTarget {
   #tellRestored = () => {};
   /** What has brought all of it. */
   #arrival = null;
+  /** What brings levels when they are seen (wanted.js), of a bundle that is larger than #maxBytes. */
+  #wanted = null;
+  #maxBytes;
   #fixedLight = false;
   #small = null;
   #framesSinceLook = LIGHT_EVERY;
@@ -74,8 +79,9 @@ export class View extends EventTarget {
    * @param canvases {picture, models}: laid over each other by the page; fixedLight: the models' light does not follow the
    * camera's picture
    */
-  static async create(bundle, { picture, models, simd = true, webgl1 = false, fixedLight = false }) {
+  static async create(bundle, { picture, models, simd = true, webgl1 = false, fixedLight = false, maxBytes = MOST_BYTES }) {
     const view = new View();
+    view.#maxBytes = maxBytes;
     view.#fixedLight = fixedLight;
     view.#picture = picture;
     view.#models = models;
@@ -109,7 +115,24 @@ export class View extends EventTarget {
       performance.mark('modar: coarse');
       this.#tellRefined();
     }
-    await this.#bringRest(arrival);
+    if (arrival.size <= this.#maxBytes || this.#maxBytes === 0 || !await this.#bringWanted(arrival)) await this.#bringRest(arrival);
+  }
+
+  /** What is seen is brought, when it is. @returns false: this host or browser gives all or nothing */
+  async #bringWanted(arrival) {
+    const { Wanted } = await import('./wanted.js');
+    const wanted = new Wanted(this.#engine, arrival.parts(), () => this.#tellRefined());
+    if (!await wanted.begin()) return false;
+    await this.#restored;
+    try {
+      wanted.show(this.#maxBytes, this.#fixedLight);
+    } catch (error) {
+      if (!this.#gl.context.isContextLost()) return false;  // #bringRest() tells why
+      this.#lose();
+    }
+    this.#wanted = wanted;
+    this.#told();
+    return true;
   }
 
   #showCoarse() {
@@ -136,7 +159,11 @@ export class View extends EventTarget {
     }
     this.#arrival = arrival;
     this.#engine.showAll(this.#fixedLight);
-    this.#empty = false;
+    this.#told();
+  }
+
+  #told() {
+    this.#empty = this.#lost;
     this.#coarse = true;  // it is there
     this.#media.forget();
     if (!this.#complete) this.#media.prepare();
@@ -264,6 +291,7 @@ export class View extends EventTarget {
   #again() {
     this.#act();
     this.#redraw();
+    this.#wanted?.ask();
     this.#drawn();
   }
 
@@ -305,7 +333,11 @@ export class View extends EventTarget {
     const { context, version } = this.#gl;
     try {
       this.#engine.useContext(context, version);
-      if (this.#coarse) this.#engine.showCoarse(this.#fixedLight);
+      if (this.#wanted) {
+        this.#wanted.show(this.#maxBytes, this.#fixedLight);
+      } else if (this.#coarse) {
+        this.#engine.showCoarse(this.#fixedLight);
+      }
     } catch (error) {
       if (context.isContextLost()) return;  // again: the next one will do
       throw error;
@@ -420,5 +452,9 @@ export class View extends EventTarget {
 
   get gpuBytes() {
     return this.#engine.gpuBytes;
+  }
+
+  get lodError() {
+    return this.#wanted?.lodError ?? 0;
   }
 }

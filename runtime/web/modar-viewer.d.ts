@@ -3,7 +3,7 @@
  * module defines the element; on a server it does nothing.
  *
  * Attributes: src, the bundle's address; poster, a picture to show before the start, and alt, its description; lang, of words and
- * texts (else that of the element around it); bare, for pages with a cover of their own: no poster and no buttons before the start.
+ * texts (else that of the element around it); max-bytes, see maxBytes in modar-view.d.ts; bare, for pages with a cover of their own: no poster and no buttons before the start.
  * Slots: poster, in place of the picture; tools, for buttons of yours beside the viewer's (class "tool": as these look).
  * CSS properties: --modar-paper, --modar-card, --modar-ink, --modar-accent (colours), --modar-font.
  */
@@ -29,7 +29,7 @@ export interface ModarViewerEventMap extends Omit<HTMLElementEventMap, 'error'>,
   progress: ProgressEvent;
   /** The bundle's patterns can be found: all of a raw bundle is there, of a packed one the rest comes meanwhile. */
   load: Event;
-  /** All of the bundle is there, and drawn. */
+  /** All of the bundle is there, and drawn; of a larger one than max-bytes, what a view has from the start. */
   whole: Event;
   /** `error` of it is a ModarError, or what getUserMedia() throws. The visitor has been told. */
   error: ErrorEvent;

@@ -272,7 +272,8 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     const opening = load(typeof source === 'function' ? await source() : source, {
       onProgress: (loaded, total) => this.#tellProgress(loaded, total),
     });
-    const creating = View.create(opening, { picture: this.#$('picture'), models: this.#freshCanvas() });
+    const most = this.getAttribute('max-bytes');
+    const creating = View.create(opening, { picture: this.#$('picture'), models: this.#freshCanvas(), ...(most && { maxBytes: Number(most) }) });
     creating.catch(() => {});  // told below, after what ails the bundle
     const opened = await opening;
     let view;

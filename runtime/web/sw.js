@@ -38,8 +38,18 @@ self.addEventListener('activate', (event) => {
     names.filter((name) => name.startsWith(OURS) && name !== CACHE && name !== INSTALLED).map((name) => caches.delete(name)))));
 });
 
+/** What is asked for of a file that is kept. */
+async function part(kept, range) {
+  const [, from, last] = /^bytes=(\d+)-(\d*)$/.exec(range);
+  const whole = await kept.blob();
+  const body = whole.slice(Number(from), last ? Number(last) + 1 : whole.size);
+  const place = `bytes ${from}-${Number(from) + body.size - 1}/${whole.size}`;
+  return new Response(body, { status: 206, headers: { 'Content-Range': place, 'Content-Length': body.size } });
+}
+
 self.addEventListener('fetch', (event) => {
   if (event.request.method !== 'GET') return;
+  const range = event.request.headers.get('range');
   event.respondWith(caches.match(event.request, { cacheName: CACHE, ignoreSearch: true })
-    .then((kept) => kept ?? fetch(event.request)));
+    .then((kept) => (kept && range ? part(kept, range) : kept ?? fetch(event.request))));
 });

@@ -83,7 +83,7 @@ class Package(unittest.TestCase):
         self.assertEqual(names, engines | {
             "package.json", "README.md", "LICENSE", "modar.js", "modar.d.ts", "modar-view.js", "modar-view.d.ts", "modar-worker.js",
             "modar-viewer.js", "modar-viewer.d.ts", "modar-worker-simd.js", "modar-worker-plain.js", "gyroscope.js", "engine.js",
-            "arrival.js", "bundle.js", "camera.js", "storage.js", "turntable.js", "media.js", "viewer-parts.js", "viewer-words.js", "words",
+            "arrival.js", "bundle.js", "camera.js", "storage.js", "turntable.js", "media.js", "viewer-parts.js", "viewer-words.js", "wanted.js", "words",
             "record-worker.js", "record-worker-simd.js", "record-worker-plain.js"})
         licence = (self.base / "node_modules" / "modar" / "LICENSE").read_text()
         for words in ("MIT License", "Mozilla Public License", "musl"):

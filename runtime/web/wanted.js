@@ -1,0 +1,166 @@
+// Levels of detail of a bundle that is larger than what a view may have: brought by ranges when a picture lacks them. Loaded with such.
+
+/** Requests at once: more fill a line with latency, and bring later what the view needs first. Set by hand. */
+const MOST_REQUESTS = 3;
+/** Pieces that are asked for together where they lie side by side. */
+const MOST_TOGETHER = 4;
+/** Ranges that are open at once: the view may have changed when the next ones are asked for. */
+const MOST_OPEN = 6;
+/** Seconds before something is asked for again, doubled each time up to 32. Set by hand. */
+const WAIT_S = 1;
+
+export class Wanted {
+  #engine;
+  #parts;
+  #onMore;
+  /** {pieces: those that are missing, done: what is called when none is}, in the order in which they are needed. */
+  #open = new Set();
+  /** Pieces that are on their way, and how often each has failed. */
+  #coming = new Set();
+  #tries = new Map();
+  #requests = 0;
+  #take;
+
+  /** parts: of an arrival. onMore: is called when a finer picture can be drawn. */
+  constructor(engine, parts, onMore) {
+    this.#engine = engine;
+    this.#parts = parts;
+    this.#onMore = onMore;
+  }
+
+  /** Brings what the engine needs in memory. @returns whether the host has ranges */
+  async begin() {
+    if (!await this.#request(0, 1, false)) {
+      console.info('The host of this bundle has no ranges: all of it is brought at once.');
+      return false;
+    }
+    this.#take = (offset, bytes) => this.#engine.put(offset, bytes);
+    await Promise.all(this.#keep().map(([offset, size]) => new Promise((resolve) => {
+      this.#add(this.#piecesOf(offset, size).filter((piece) => piece >= this.#parts.first), resolve);
+    })));
+    this.#take = (offset, bytes) => {
+      this.#engine.frameBuffer(bytes.length).set(bytes);
+      this.#engine.module._web_fill(offset, this.#engine.frameAt, bytes.length);
+    };
+    return true;
+  }
+
+  /** What the engine has to have before show(): [[offset, size]]. */
+  #keep() {
+    this.#engine.check(this.#engine.module._web_keep());
+    const kept = [];
+    for (let range; (range = this.#numbers(this.#engine.module._web_kept(kept.length), 2));) kept.push(range);
+    return kept;
+  }
+
+  /** Numbers that a function of the engine points at; null: at nothing. */
+  #numbers(at, count) {
+    return at === 0 ? null : [...new Uint32Array(this.#engine.module.HEAPU8.buffer, at, count)];
+  }
+
+  /** Draws the finest that has come from now on, within so many bytes of the GPU: in a new context, from the beginning. */
+  show(gpuBytes, fixedLight) {
+    this.#open.clear();
+    this.#engine.check(this.#engine.module._web_show_wanted(gpuBytes, fixedLight ? 1 : 0));
+  }
+
+  /** The greatest error of what was drawn last, pixels. */
+  get lodError() {
+    return this.#engine.module._web_lod_error();
+  }
+
+  /** After a picture: what it lacked. */
+  ask() {
+    for (let next; this.#open.size < MOST_OPEN && (next = this.#numbers(this.#engine.module._web_open_wanted(), 3));) {
+      const [number, offset, size] = next;
+      this.#add(this.#piecesOf(offset, size), () => {
+        this.#engine.module._web_have(number);
+        this.#onMore();
+      });
+    }
+  }
+
+  #piecesOf(offset, size) {
+    return this.#parts.pieces.flatMap((piece, i) => (piece.offset < offset + size && offset < piece.offset + piece.size ? [i] : []));
+  }
+
+  #add(pieces, done) {
+    if (pieces.length === 0) return done();
+    this.#open.add({ pieces: new Set(pieces), done });
+    this.#pump();
+  }
+
+  #pump() {
+    for (let run; this.#requests < MOST_REQUESTS && (run = this.#next());) {
+      ++this.#requests;
+      for (const piece of run) this.#coming.add(piece);
+      this.#bring(run).then((more) => {
+        --this.#requests;
+        if (more) this.#pump();
+      });
+    }
+  }
+
+  /** Pieces that lie side by side and are missing; null: none is. */
+  #next() {
+    for (const { pieces } of this.#open) {
+      const missing = (piece) => pieces.has(piece) && !this.#coming.has(piece);
+      const first = [...pieces].find(missing);
+      if (first === undefined) continue;
+      const run = [first];
+      while (run.length < MOST_TOGETHER && missing(first + run.length)) run.push(first + run.length);
+      return run;
+    }
+    return null;
+  }
+
+  /** @returns false: nothing more is wanted */
+  async #bring(run) {
+    const { pieces, decode, signal } = this.#parts;
+    const from = pieces[run[0]].at;
+    const last = pieces[run.at(-1)];
+    const again = run.some((piece) => this.#tries.has(piece));
+    const bytes = await this.#request(from, last.at + last.stored - from, again).catch(() => null);
+    for (const piece of run) {
+      const { at, stored, offset } = pieces[piece];
+      const raw = bytes && await decode(pieces[piece], bytes.slice(at - from, at - from + stored)).catch(() => null);
+      if (signal.aborted) return false;
+      if (raw) this.#have(piece, offset, raw);
+      else this.#comeAgain(piece);
+    }
+    return true;
+  }
+
+  #have(piece, offset, raw) {
+    this.#coming.delete(piece);
+    this.#tries.delete(piece);
+    this.#take(offset, raw);
+    for (const open of this.#open) {
+      if (!open.pieces.delete(piece) || open.pieces.size > 0) continue;
+      this.#open.delete(open);
+      open.done();
+    }
+  }
+
+  #comeAgain(piece) {
+    const tries = this.#tries.get(piece) ?? 0;
+    this.#tries.set(piece, tries + 1);
+    setTimeout(() => {
+      this.#coming.delete(piece);
+      this.#pump();
+    }, 1000 * WAIT_S * 2 ** Math.min(tries, 5));
+  }
+
+  /** Some bytes of the file; null: the host has no ranges. */
+  async #request(at, size, again) {
+    const { bundle, signal } = this.#parts;
+    if (bundle instanceof Uint8Array) return bundle.subarray(at, at + size);
+    const response = await fetch(bundle, { signal, headers: { Range: `bytes=${at}-${at + size - 1}` }, cache: again ? 'no-store' : 'default' });
+    if (response.status !== 206) {
+      response.body?.cancel().catch(() => {});
+      return null;
+    }
+    const bytes = new Uint8Array(await response.arrayBuffer());
+    return bytes.length === size ? bytes : null;
+  }
+}
