@@ -24,6 +24,17 @@ export const STAGE = { find: 1, show: 2, refine: 3 };
 
 const pause = (seconds) => new Promise((resolve) => { setTimeout(resolve, 1000 * seconds); });
 
+/** All in one, of its own memory: a blob's is not counted by the browser, which would keep many. */
+function joined(parts) {
+  const all = new Uint8Array(parts.reduce((size, { length }) => size + length, 0));
+  let at = 0;
+  for (const part of parts) {
+    all.set(part, at);
+    at += part.length;
+  }
+  return all;
+}
+
 /** A reader that reads on by itself, and calls back at the end. */
 function eager(reader, onEnd) {
   const reads = [];
@@ -160,8 +171,7 @@ export class Source {
       this.#copy?.add(part);
       this.onProgress?.(this.#taken, Math.max(this.total, this.#taken));
     }
-    if (parts.length === 1) return parts[0].slice();
-    return new Uint8Array(await new Blob(parts).arrayBuffer());
+    return joined(parts);
   }
 
   /** The same file from a place on, once more. */
@@ -228,7 +238,7 @@ export class RawArrival {
     let head = start;
     const grow = async (to) => {
       const more = await this.#source.take(to - head.length, false);
-      head = new Uint8Array(await new Blob([head, more]).arrayBuffer());
+      head = joined([head, more]);
       return new DataView(head.buffer);
     };
     let view = await grow(HEADER_BYTES);
@@ -348,7 +358,7 @@ export class Arrival {
 
   async #decode({ index, at, stored, offset, size }, bytes, take) {
     let copy = bytes;
-    const answer = await this.#tried(() => this.#decoder.ask({ type: 'piece', index, stored: copy, size }),
+    const answer = await this.#tried(() => this.#decoder.ask({ type: 'piece', index, stored: copy, size }, [copy.buffer]),
       async () => { copy = await this.#source.again(at, stored); });
     take(offset, answer.bytes);
   }
@@ -376,7 +386,7 @@ export class Arrival {
 
   /** In place of bring(), for wanted.js: parts that can be had by themselves. first: of those that have not come. */
   parts() {
-    const decode = async ({ index, size }, stored) => (await this.#decoder.ask({ type: 'piece', index, stored, size })).bytes;
+    const decode = async ({ index, size }, stored) => (await this.#decoder.ask({ type: 'piece', index, stored, size }, [stored.buffer])).bytes;
     return { ...this.#source.leave(), pieces: this.#pieces, first: this.#next, decode };
   }
 

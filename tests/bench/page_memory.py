@@ -56,7 +56,7 @@ def settle(browser, seconds=3):
 
 
 def visit(site, waits=200):
-    """Resident bytes by process: of a blank page, at the end of a visit, and the greatest sum meanwhile."""
+    """Resident bytes by process: of a blank page, at the end of a visit, and where their sum was greatest meanwhile."""
     server, folder = serve(site), tempfile.mkdtemp(prefix="modar-memory-")
     browser = Browser(folder, "none.y4m")
     try:
@@ -65,15 +65,15 @@ def visit(site, waits=200):
         blank = settle(browser)
         browser.call("Page.addScriptToEvaluateOnNewDocument", source=PRESS)
         browser.call("Page.navigate", url=f"http://localhost:{server.server_port}/")
-        most, end = 0, time.monotonic() + waits
+        most, end = blank, time.monotonic() + waits
         while not browser.run(WHOLE):
             if time.monotonic() > end:
                 raise RuntimeError(f"the bundle is not there after {waits} s: {browser.errors}")
-            most = max(most, sum(resident_by_process(browser.process.pid).values()))
-            time.sleep(1)
+            most = max(most, resident_by_process(browser.process.pid), key=lambda kinds: sum(kinds.values()))
+            time.sleep(0.5)
         browser.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))")
         done = settle(browser)
-        return blank, done, max(most, sum(done.values()))
+        return blank, done, max(most, done, key=lambda kinds: sum(kinds.values()))
     finally:
         browser.close()
         server.shutdown()
@@ -105,9 +105,10 @@ def main():
         blank, done, most = measure(options.bundle, options.page, raw)
         base = sum(blank.values()) + rest
         print(json.dumps({"bundle": "raw" if raw else "packed", "bundle_mb": round(size / 1e6, 1), "blank_mb": round(sum(blank.values()) / 1e6, 1),
-                          "page_mb": round(rest / 1e6, 1), "visit_mb": round(sum(done.values()) / 1e6, 1), "most_mb": round(most / 1e6, 1),
+                          "page_mb": round(rest / 1e6, 1), "visit_mb": round(sum(done.values()) / 1e6, 1), "most_mb": round(sum(most.values()) / 1e6, 1),
                           "grown_mb": {kind: round((bytes_ - blank.get(kind, 0)) / 1e6, 1) for kind, bytes_ in sorted(done.items())},
-                          "a_byte": round((sum(done.values()) - base) / size, 2), "most_a_byte": round((most - base) / size, 2)}), flush=True)
+                          "most_grown_mb": {kind: round((bytes_ - blank.get(kind, 0)) / 1e6, 1) for kind, bytes_ in sorted(most.items())},
+                          "a_byte": round((sum(done.values()) - base) / size, 2), "most_a_byte": round((sum(most.values()) - base) / size, 2)}), flush=True)
 
 
 if __name__ == "__main__":
