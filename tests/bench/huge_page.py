@@ -1,0 +1,155 @@
+#!/usr/bin/env python3
+"""A flight over a huge scan in a page that may have little of it on the GPU, in Chromium on a slow line.
+
+    huge_page.py BUNDLE [--max-bytes 64000000] [--line 10e6] [--latency 100] [--seconds 60] [--nearest 0.02] [--page FOLDER] [--keep FOLDER]
+
+Makes the page of `modar web`, serves it by ranges, and flies: from far down to the surface, along it, and up again. Prints JSON:
+frames and the longest one (milliseconds, with the drawing, which is SwiftShader's on a CPU), the longest task of the page's own, bytes that
+came, the greatest number of bytes on the GPU, resident memory of all of the browser's processes beside a blank page's, and in pixels on the
+screen the error of what was drawn: at the end of each third of the flight, and by how much it fell at once (pop), the worst time.
+Errors are those of the bundle's levels, which count shading too: the form differs by less.
+
+`modar-model-probe make SCAN TRIANGLES OUT.obj` makes a huge scan out of one; bake it with default options. Needs modar on the path,
+chromium, and the page's engine (preset `web`).
+"""
+import argparse
+import functools
+import http.server
+import json
+import pathlib
+import re
+import shutil
+import sys
+import tempfile
+import threading
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "web"))
+from browser import Browser, Quiet  # noqa: E402
+from first_visit import make_site  # noqa: E402
+from page_memory import resident_by_process, settle  # noqa: E402
+
+FLY = """(async () => {
+  const [{ load }, { View }] = await Promise.all([import('/modar.js'), import('/modar-view.js')]);
+  const canvas = () => {
+    const made = document.createElement('canvas');
+    Object.assign(made.style, { position: 'absolute', width: '640px', height: '480px' });
+    document.body.append(made);
+    return made;
+  };
+  const flown = globalThis.flown = { frames: 0, longest: 0, task: 0, gpu: 0, pop: 0, errors: [], done: false };
+  new PerformanceObserver((list) => {
+    for (const { duration } of list.getEntries()) flown.task = Math.max(flown.task, duration);
+  }).observe({ type: 'longtask' });
+  const began = performance.now();
+  const modar = await load('%(bundle)s');
+  const view = await View.create(modar, { picture: canvas(), models: canvas(), fixedLight: true, maxBytes: %(bytes)d });
+  await view.whole;
+  flown.shown = (performance.now() - began) / 1000;
+  const { low, high } = view.bounds(0);
+  const middle = low.map((_, i) => (low[i] + high[i]) / 2), size = Math.max(...high.map((_, i) => high[i] - low[i]));
+  // The eye goes around the model's middle and looks at it: share of the flight to a matrix.
+  const from = (share) => {
+    const near = 0.5 - 0.5 * Math.cos(2 * Math.PI * Math.min(1, Math.max(0, share)));
+    const turn = 4 * share;
+    const eye = [Math.sin(turn), -Math.cos(turn), 0.35], length = Math.hypot(...eye);
+    const back = eye.map((x) => x / length), right = [-back[1], back[0], 0].map((x) => x / Math.hypot(back[0], back[1]));
+    const up = [back[1] * right[2] - back[2] * right[1], back[2] * right[0] - back[0] * right[2], back[0] * right[1] - back[1] * right[0]];
+    const reach = back.reduce((sum, x, i) => sum + Math.abs(x) * (high[i] - middle[i]), 0);  // of the box around it
+    const at = middle.map((x, i) => x + back[i] * (reach + size * (3 * (1 - near) + %(nearest)g * near))), dot = (a) => -a.reduce((sum, x, i) => sum + x * at[i], 0);
+    return Float32Array.of(right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0, dot(right), dot(up), dot(back), 1);
+  };
+  const start = performance.now();
+  for (let before = start, error = 0, third = 1; ;) {
+    const now = await new Promise(requestAnimationFrame), share = (now - start) / 1000 / %(seconds)g;
+    if (share >= 1) break;
+    view.drawFrom(0, from(share), 500);
+    if (flown.frames++ > 0) {
+      flown.longest = Math.max(flown.longest, now - before);
+      flown.pop = Math.max(flown.pop, error - view.lodError);
+    }
+    [before, error] = [now, view.lodError];
+    flown.gpu = Math.max(flown.gpu, view.gpuBytes);
+    if (share > third / 3) flown.errors[third++ - 1] = error;
+  }
+  flown.errors.push(view.lodError);
+  flown.done = true;
+})().catch((error) => { globalThis.flown = { done: true, error: String(error.stack ?? error) }; }), 0"""
+
+
+class Ranged(Quiet):
+    """Files by ranges, read as they are asked for."""
+
+    def do_GET(self):
+        path = pathlib.Path(self.translate_path(self.path))
+        if not path.is_file():
+            return super().do_GET()
+        size, asked = path.stat().st_size, re.fullmatch(r"bytes=(\d+)-(\d*)", self.headers.get("Range") or "")
+        first, last = (int(asked[1]), min(int(asked[2] or size - 1), size - 1)) if asked else (0, size - 1)
+        self.send_response(206 if asked else 200)
+        for name, value in (("Content-Type", self.guess_type(path)), ("Content-Length", str(last + 1 - first)), ("Cache-Control", "no-store"),
+                            *((("Content-Range", f"bytes {first}-{last}/{size}"),) if asked else ())):
+            self.send_header(name, value)
+        self.end_headers()
+        try:
+            with open(path, "rb") as file:
+                file.seek(first)
+                while first <= last and (part := file.read(min(1 << 16, last + 1 - first))):
+                    self.wfile.write(part)
+                    first += len(part)
+                    if path.suffix in (".packed", ".modar"):
+                        self.server.sent += len(part)
+        except OSError:
+            pass  # the page has what it wants
+
+
+def fly(site, bundle, options):
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Ranged, directory=str(site)))
+    server.sent = 0
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    folder = tempfile.mkdtemp(prefix="modar-huge-")
+    browser = Browser(folder, "none.y4m")
+    try:
+        (site / "blank.html").write_text("<!doctype html><title>blank</title>")
+        browser.open(f"http://localhost:{server.server_port}/blank.html")
+        blank = sum(settle(browser).values())
+        browser.throttle(options.line / 8, options.latency)
+        browser.run(FLY % {"bundle": "/" + bundle, "bytes": options.max_bytes, "seconds": options.seconds, "nearest": options.nearest})
+        most, end = 0, time.monotonic() + 300 + options.seconds
+        while not browser.run("globalThis.flown?.done ?? false") and time.monotonic() < end:
+            most = max(most, sum(resident_by_process(browser.process.pid).values()))
+            time.sleep(1)
+        flown = browser.run("globalThis.flown ?? {}")
+        flown.update(came_mb=server.sent / 1e6, rss_mb=(sum(settle(browser).values()) - blank) / 1e6, rss_most_mb=(most - blank) / 1e6)
+        return flown
+    finally:
+        browser.close()
+        server.shutdown()
+        server.server_close()
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("bundle", type=pathlib.Path)
+    parser.add_argument("--max-bytes", type=float, default=64e6, help="of the GPU; 0: no limit")
+    parser.add_argument("--line", type=float, default=10e6, help="bits a second")
+    parser.add_argument("--latency", type=float, default=100, help="milliseconds")
+    parser.add_argument("--seconds", type=float, default=60, help="of the flight")
+    parser.add_argument("--nearest", type=float, default=0.02, help="of the eye to the box around the scan, in longest sides of it")
+    parser.add_argument("--page", help="of another build")
+    parser.add_argument("--keep", type=pathlib.Path, help="a folder for the site, which is used again where it is there")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="modar-huge-site-") as base:
+        site = options.keep or pathlib.Path(base) / "site"
+        if not (site / "site.json").exists():
+            make_site(site, options.bundle, options.page, False)
+        bundle = json.loads((site / "site.json").read_text())["bundles"][0]["file"]
+        flown = fly(site, bundle, options)
+        print(json.dumps({name: [round(x, 2) for x in value] if isinstance(value, list) else round(value, 2) if isinstance(value, float) else value
+                          for name, value in {"bundle_mb": options.bundle.stat().st_size / 1e6,
+                                              "packed_mb": (site / bundle.split("?")[0]).stat().st_size / 1e6, **flown}.items()}))
+
+
+if __name__ == "__main__":
+    main()
