@@ -41,7 +41,7 @@ void stand_in_for(BundleContent& content, std::uint32_t model, float error) {
 
 /// Model 0 is a blue rectangle without stand-ins, model 1 two red chunks beside each other, with a
 /// finer stand-in in two green chunks and a coarser one in one blue chunk.
-BundleContent two_models() {
+BundleContent two_models(float coarse = 0.1f) {
   SceneMaker maker;
   maker.add_plain_model(Layout::kHalfColoured, rectangle(-0.5, 0.5, kBlue));
   const std::uint32_t material = maker.add_material(flat_material());
@@ -56,7 +56,7 @@ BundleContent two_models() {
   add({rectangle(-0.5, 0.0, kGreen), rectangle(0.0, 0.5, kGreen)});
   stand_in_for(maker.content, 1, 0.01f);
   add({rectangle(-0.5, 0.5, kBlue)});
-  stand_in_for(maker.content, 1, 0.1f);
+  stand_in_for(maker.content, 1, coarse);
   return maker.content;
 }
 
@@ -124,6 +124,16 @@ TEST_F(StandInTest, TakesThePlaceOfChunksThatDoNotFitTheMemory) {
   const std::unique_ptr<Renderer> poor = make_renderer(*bundle.view, caps);
   ASSERT_TRUE(poor);
   EXPECT_EQ(colours(*poor, 1.2), std::set<Rgb>{kBlue});
+}
+
+/// Of stand-ins whose errors differ little, the finest that fits, not the coarsest.
+TEST_F(StandInTest, TheFinestThatFitsTakesTheirPlace) {
+  const MappedBundle bundle(two_models(0.02f));
+  GlCaps caps = probe_gl_caps();
+  caps.gpu_memory = 14 * (bundle.view->layouts()[0].stride + 2u);
+  const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, caps);
+  ASSERT_TRUE(renderer);
+  EXPECT_EQ(colours(*renderer, 1.2), std::set<Rgb>{kGreen});
 }
 
 TEST_F(StandInTest, ItemsOfOtherModelsStayAsTheyAre) {
