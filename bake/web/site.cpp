@@ -261,6 +261,9 @@ Result<void> put_room(Draft& draft, const BundleView& bundle, std::uint32_t patt
   return {};
 }
 
+// Bytes of a bundle up to which a page brings it whole: MOST_BYTES of modar-view.js.
+constexpr std::size_t kMostWhole = std::size_t{64} << 20;
+
 /// The bundle, for pages of one's own, and packed, as this page loads it; answers the address that
 /// it loads. A page that is written again after each bake stays with the bundle, which packing
 /// would make it wait for. stem: of the files' names.
@@ -278,7 +281,11 @@ Result<std::string> put_bytes(Draft& draft, const std::string& stem,
   draft.site.packed_bytes += packed.size();
   // The page asks for what shows something first, where the host has ranges.
   const std::string query = version + "&first=" + std::to_string(shown_bytes(packed));
-  MODAR_TRY(put(draft, stem + ".packed", packed, query));
+  // Of a larger one the page brings what is seen, level by level: a phone that was to keep all of it
+  // for visits without a network would fetch hundreds of megabytes beside that.
+  const bool whole = bytes.size() <= kMostWhole;
+  MODAR_TRY(whole ? put(draft, stem + ".packed", packed, query)
+                  : put_online(draft, stem + ".packed", packed));
   return stem + ".packed" + query;
 }
 
