@@ -27,15 +27,26 @@ constexpr double kSeen = 4.0;    // seconds in which the pattern is seen, first 
 constexpr double kUnseen = 5.0;  // seconds in between
 constexpr double kLength = 2 * kSeen + kUnseen - 2;
 
-enum class Scene : std::uint8_t { kTurned, kCovered, kPasserBy, kFilled, kPartly, kCarried };
+enum class Scene : std::uint8_t {
+  kTurned,
+  kCovered,
+  kPasserBy,
+  kFilled,
+  kTurnedFilled,
+  kPartly,
+  kCarried
+};
 struct SceneName {
   Scene scene;
   const char* name;
 };
-constexpr SceneName kScenes[] = {
-    {Scene::kTurned, "turned"},         {Scene::kCovered, "covered"},
-    {Scene::kPasserBy, "passer-by"},    {Scene::kFilled, "filled by passer-by"},
-    {Scene::kPartly, "partly covered"}, {Scene::kCarried, "carried"}};
+constexpr SceneName kScenes[] = {{Scene::kTurned, "turned"},
+                                 {Scene::kCovered, "covered"},
+                                 {Scene::kPasserBy, "passer-by"},
+                                 {Scene::kFilled, "filled by passer-by"},
+                                 {Scene::kTurnedFilled, "filled by passer-by while turned"},
+                                 {Scene::kPartly, "partly covered"},
+                                 {Scene::kCarried, "carried"}};
 
 /// 0 before `from`, 1 after `to`, smooth in between.
 double ramp(double time, double from, double to) {
@@ -55,7 +66,7 @@ Pose camera_at(Scene scene, double time, const std::array<double, 8>& phase) {
                     4.6 + sway * 0.25 * wave(4, 0.18)};
   double yaw = sway * 0.02 * wave(5, 0.9);
   double pitch = sway * 0.02 * wave(6, 0.7);
-  if (scene == Scene::kTurned) {
+  if (scene == Scene::kTurned || scene == Scene::kTurnedFilled) {
     const double away = ramp(time, kSeen - 0.4, kSeen + 1.8) -
                         ramp(time, kSeen + kUnseen - 1.8, kSeen + kUnseen + 0.4);
     yaw += away * pi / 3;
@@ -89,16 +100,28 @@ struct Sequence {
             {0.9 * std::sin(1.4 * time), 0.3 * std::sin(1.9 * time), 0.4 + 0.3 * std::sin(time)}};
   }
 
+  /// Someone who passes between the camera and all else, `gone` seconds after the pattern was
+  /// hidden: at any speed, near or further away, narrower than the frame or much wider.
+  [[nodiscard]] Board filling_passer_by(double gone) const {
+    Pose eye = camera_at(scene, kSeen + 0.5 * kUnseen, phase);
+    if (scene == Scene::kFilled) eye.rotation = glm::dmat3{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
+    const glm::dmat3 axes = glm::transpose(eye.rotation);
+    const glm::dvec3 centre = -(axes * eye.translation);
+    const double away = 1.2 + 1.6 * phase[6];
+    const double wide = away * (0.9 + 1.3 * phase[7]);
+    const double speed = away * (0.4 + 1.4 * phase[5]);
+    const double x = speed * (gone - 0.5 * kUnseen) - 0.5 * wide;
+    return {centre + axes * glm::dvec3(x, -1.5 * away, away), axes * glm::dvec3(wide, 0, 0.15),
+            axes * glm::dvec3(0, 3.0 * away, 0), &pictures[2 % pictures.size()], 1};
+  }
+
   [[nodiscard]] GrayPicture frame(double time, Random& random) const {
     std::vector<Board> boards = room;
     const Pose pose = camera_at(scene, time, phase);
     boards.push_back(board_of(pattern, placed(time)));
     const double gone = time - kSeen;
-    if (hidden(time) && scene == Scene::kFilled) {
-      // Someone passes so close that nothing else is seen for a second and a half.
-      const double x = -4.5 + 9 * gone / kUnseen;
-      boards.push_back(
-          {{x - 2.1, 3.0, 2.6}, {4.2, 0, 0.3}, {0, -6.0, 0}, &pictures[2 % pictures.size()], 1});
+    if (hidden(time) && (scene == Scene::kFilled || scene == Scene::kTurnedFilled)) {
+      boards.push_back(filling_passer_by(gone));
     } else if (scene == Scene::kPartly) {
       // Something slides to and fro over up to 65 % of it, from below right.
       const double slide = 1.15 - 0.65 * (1 - std::cos(2 * pi * time / 3.0));

@@ -28,9 +28,10 @@ struct ExtendedRow {
 
 /// For each pattern and scene a sequence of `frames` frames at most, 30 a second: the camera turns
 /// by 60 degrees and back while it moves half a pattern's width (`turned`); something covers the
-/// pattern (`covered`); the same with a passer-by (`passer-by`), who may fill the frame (`filled by
-/// passer-by`); something slides to and fro over a part of the pattern (`partly covered`); the
-/// pattern is carried through the room before a still camera, then hidden, where any pose is wrong
+/// pattern (`covered`); the same with a passer-by (`passer-by`); one who may fill the frame, at any
+/// speed (`filled by passer-by`, and `... while turned`); something slides to and fro over a part
+/// of the pattern (`partly covered`); the pattern is carried through the room before a still
+/// camera, then hidden, where any pose is wrong
 /// (`carried`). Turns and covers take five seconds. only: scenes whose name holds it. Errors: those
 /// of reading pictures, baking and the tracker.
 Result<std::vector<ExtendedRow>> bench_extended(const PoseBenchOptions& options,

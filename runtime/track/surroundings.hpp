@@ -2,6 +2,7 @@
 // pattern is seen, from which the camera's pose follows while it is not. Internal to runtime/track.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -22,6 +23,13 @@ struct ExtendedPose {
   /// What the last motion, and what changed in the coarse picture, made of the frame before.
   std::array<Pose, 2> expected;
 };
+
+/// Standard deviation of the rotation of a pattern's own pose, radians: 0.14 degrees with 200
+/// patches in place, 0.3 with 100, as they were off in one rendered room.
+inline double seen_sigma(int patches) {
+  constexpr double kOfPatches = 0.5;  // radians times patches
+  return kOfPatches / std::max(patches, 1);
+}
 
 /// A patch of the frame that it was first seen in, and its inverse depth there.
 struct MapPoint {
