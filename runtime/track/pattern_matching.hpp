@@ -46,6 +46,11 @@ struct HomographyHypothesis {
   std::vector<std::uint8_t> mask;  ///< by match: 1 for inliers
 };
 
+/// The pose that shows the surface's tangent plane at a place of the picture nearly alike: both
+/// solutions of a plane's pose (Collins & Bartoli, "Infinitesimal plane-based pose estimation",
+/// 2014).
+Pose mirrored_about(const TrackedPattern& pattern, glm::dvec2 place, const Pose& pose);
+
 /// Finds homographies of one pattern at a time. Allocates nothing after construction.
 class PlaneMatcher {
  public:

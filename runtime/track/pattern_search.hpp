@@ -107,6 +107,8 @@ class PatternSearch {
                                              SearchRadius radius, const Pose& start) const;
   [[nodiscard]] PoseCandidate refine_start(const TrackedPattern& pattern, const FrameView& frame,
                                            Pose start) const;
+  [[nodiscard]] PoseCandidate ask_other_faces(const TrackedPattern& pattern, const FrameView& frame,
+                                              const PoseCandidate& one) const;
   /// Whether the features of the hypothesis speak for it by themselves.
   [[nodiscard]] bool vouched() const;
   [[nodiscard]] bool bent(const TrackedPattern& pattern) const;

@@ -43,10 +43,11 @@ class Filtered {
 // Cells along a side of a box's face. With cells over the whole picture, most of them lay on two
 // faces or on hidden ones: a face seen alone had five, and was never believed.
 constexpr int kFaceCellSide = 4;
+constexpr int kFaceCells = kFaceCellSide * kFaceCellSide;
 
 int cells_of(const TrackedPattern& pattern) {
   const auto faces = static_cast<int>(pattern.surface.faces().size());
-  return faces > 0 ? kFaceCellSide * kFaceCellSide * faces : kCells;
+  return faces > 0 ? kFaceCells * faces : kCells;
 }
 
 /// Pattern pixels between samples.
@@ -70,7 +71,6 @@ glm::dvec2 share_at(int cell, int k, int side) {
 /// beside a face in the picture is another one.
 glm::dvec2 place_of(const TrackedPattern& pattern, int cell, int k, const Mirror* mirror,
                     int side) {
-  constexpr int kFaceCells = kFaceCellSide * kFaceCellSide;
   if (!pattern.surface.faces().empty()) {
     const auto faces = pattern.surface.faces();
     const auto& face =
@@ -174,7 +174,10 @@ PhotometricCheck check_photometry(const TrackedPattern& pattern, const PlaneMap&
     if (!match.textured()) continue;
     ++check.cells;
     check.correlation += static_cast<double>(std::max(0.0f, match.correlation));
-    if (match.agrees()) ++check.matching;
+    if (!match.agrees()) continue;
+    ++check.matching;
+    if (!pattern.surface.faces().empty())
+      ++check.of_face[static_cast<std::size_t>(cell / kFaceCells)];
   }
   if (check.cells > 0) check.correlation /= check.cells;
   return check;

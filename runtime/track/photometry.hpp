@@ -84,7 +84,8 @@ CellMatch compare(const CellSamples& expected, const CellSamples& seen);
 struct PhotometricCheck {
   int cells = 0;
   int matching = 0;
-  double correlation = 0;  ///< mean of the cells, negative ones counted as 0
+  double correlation = 0;                     ///< mean of the cells, negative ones counted as 0
+  std::array<int, kMaxShapeFaces> of_face{};  ///< matching ones, of a box
 };
 PhotometricCheck check_photometry(const TrackedPattern& pattern, const PlaneMap& map,
                                   std::span<const GrayImage> pyramid);

@@ -40,7 +40,8 @@ std::optional<Pose> touching_pose(const TrackedPattern& pattern, const Camera& c
   return pose;
 }
 
-/// The same of the mirror image of that plane.
+}  // namespace
+
 Pose mirrored_about(const TrackedPattern& pattern, glm::dvec2 place, const Pose& pose) {
   const SurfacePoint point = pattern.surface.at(place.x, place.y);
   const glm::dvec3 normal =
@@ -59,6 +60,8 @@ Pose mirrored_about(const TrackedPattern& pattern, glm::dvec2 place, const Pose&
   out.translation = other.translation - out.rotation * vector_of(point.at);
   return out;
 }
+
+namespace {
 
 /// Leaves of the matches in a mask those on one face of a box, on which most of them lie: that is
 /// all that a homography explains, and a match by chance on another face turned the pose by 30
