@@ -281,8 +281,8 @@ Result<std::string> put_bytes(Draft& draft, const std::string& stem,
   draft.site.packed_bytes += packed.size();
   // The page asks for what shows something first, where the host has ranges.
   const std::string query = version + "&first=" + std::to_string(shown_bytes(packed));
-  // Of a larger one the page brings what is seen, level by level: a phone that was to keep all of it
-  // for visits without a network would fetch hundreds of megabytes beside that.
+  // Of a larger one the page brings what is seen, level by level: a phone that was to keep all of
+  // it for visits without a network would fetch hundreds of megabytes beside that.
   const bool whole = bytes.size() <= kMostWhole;
   MODAR_TRY(whole ? put(draft, stem + ".packed", packed, query)
                   : put_online(draft, stem + ".packed", packed));
