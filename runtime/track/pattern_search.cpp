@@ -25,6 +25,10 @@ constexpr int kVaguePercent = 60;
 constexpr int kVagueCells = 24;
 constexpr double kVagueRms = 3.0;
 constexpr double kVouchedRms = 3.0;  // the same of features that speak for a place by themselves
+// Of weaker features, which chance brings sooner: percent of the cells that must correlate where
+// the features do not vouch for a place by themselves. Poses of less let better ones by: covered to
+// 70 % 87.5 -> 89.6 % right; 45 and 60 gave the same there and on small and tilted patterns.
+constexpr int kSparePercent = 60;
 // Reprojection RMS after patches took over, of that before: above the first the place loses
 // kDoubtPenalty points of its score, above the second (and a sigma) all. Patches on the edge of an
 // occluder draw a pose away from what all features say. By hand on half-covered patterns.
@@ -417,6 +421,7 @@ bool PatternSearch::vouched() const {
 
 bool PatternSearch::convinces(const TrackedPattern& pattern, const FrameView& frame,
                               const PoseCandidate& one) const {
+  if (features_ == Features::kSpare && one.percent < kSparePercent && !vouched()) return false;
   if (one.finest && vouched() && !one.few) return one.percent >= kVouchedPercent;
   if (one.finest) return one.percent >= (one.close ? kClosePatchesPercent : kMinPercent);
   return one.percent >= (vouched() ? kMinPercent : kVaguePercent) &&
