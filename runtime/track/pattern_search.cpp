@@ -320,8 +320,8 @@ void PatternSearch::conclude(const TrackedPattern& pattern, const FrameView& fra
     find_map(pattern, frame, hypotheses_.front(), best_.percent + kMapGain, candidate);
   }
   // Small patterns have too few of the frame's features: of those at 2 to 5 % of the frame, 41 %
-  // were found without the spare ones, and 56 % with them; of those covered to 70 %, 83 and 88 %
-  // right.
+  // were found without the spare ones, and 56 % with them; of those covered to 70 %, 83 and 90 %
+  // were right.
   if (candidate.reason != Reason::kVisible && features_ == Features::kAll) {
     features_ = Features::kSpare;
     return;
