@@ -217,11 +217,11 @@ void ExtendedTracking::continue_blend(Detection& detection) {
   Track shown;
   shown.pose = blended(detection.pose);
   if (frames_.locate(patterns_[anchor_], shown, detection)) {
-    detection.extended = true;
-    if (detection.rotation_sigma == 0) {
+    if (!detection.extended) {
       detection.rotation_sigma = seen_sigma(detection.inliers);
       detection.position_sigma = detection.rotation_sigma * glm::length(detection.pose.translation);
     }
+    detection.extended = true;
     detection.position_sigma += blend_.share * glm::length(blend_.translation);
     detection.rotation_sigma += blend_.share * glm::length(blend_.rotation);
   }

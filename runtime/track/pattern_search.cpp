@@ -25,9 +25,10 @@ constexpr int kVaguePercent = 60;
 constexpr int kVagueCells = 24;
 constexpr double kVagueRms = 3.0;
 constexpr double kVouchedRms = 3.0;  // the same of features that speak for a place by themselves
-// Of weaker features, which chance brings sooner: percent of the cells that must correlate where
-// the features do not vouch for a place by themselves. Poses of less let better ones by: covered to
-// 70 % 87.5 -> 89.6 % right; 45 and 60 gave the same there and on small and tilted patterns.
+// For a pose found with the spare features that the features do not vouch for: percent of the cells
+// that must correlate. Lower accepts poses that keep better ones from being tried: covered to 70 %,
+// 89.6 % right with 60 and with 45, 87.5 without a limit; another seed, and small and tilted
+// patterns, are the same with all three.
 constexpr int kSparePercent = 60;
 // Reprojection RMS after patches took over, of that before: above the first the place loses
 // kDoubtPenalty points of its score, above the second (and a sigma) all. Patches on the edge of an
@@ -401,6 +402,7 @@ PatternSearch::PoseCandidate PatternSearch::ask_other_faces(const TrackedPattern
                                                             const PoseCandidate& one) const {
   // Of 192 frames of boxes (`modar-lab bench pose --shape`), 9 and 62 pixels beside without this:
   // two, with it none; of 192 of roughly cut ones, 47 pixels: one, with it none.
+  // Lower lets noise decide between two equal images; not swept.
   constexpr int kMoreCells = 3;
   const auto cells_at = [&](const Pose& pose) {
     return check_photometry(pattern, map_of_pose(pattern, camera_, pose), frame.pyramid);

@@ -52,7 +52,7 @@ constexpr double kFlatMapShare = 0.9;
 // and kNeighbour for each of a cell's eight neighbours that agrees, too. What hides a print leaves
 // whole parts of it, alike to 0.86 to 1.1 by this sum in 186 frames, half and 70 % covered or under
 // glare; cells of other regular prints agree here and there, and had 0.74 to 0.86 where such prints
-// were taken for each other (`modar-lab bench clutter`). A landscape was seen in one of 12,500
+// were taken for each other (`modar-lab bench clutter`). A landscape was seen in one of 7,500
 // frames with a share of 0.5, and 0.6 changes nothing where prints are half or 70 % covered.
 constexpr double kPlainShare = 0.6;
 constexpr double kNeighbour = 0.04;

@@ -25,25 +25,20 @@ import threading
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "web"))
-from browser import Browser, Quiet  # noqa: E402
+from browser import CANVAS, Browser, Quiet  # noqa: E402
 from first_visit import make_site  # noqa: E402
 from page_memory import resident_by_process, settle  # noqa: E402
 
 FLY = """(async () => {
   const [{ load }, { View }] = await Promise.all([import('/modar.js'), import('/modar-view.js')]);
-  const canvas = () => {
-    const made = document.createElement('canvas');
-    Object.assign(made.style, { position: 'absolute', width: '640px', height: '480px' });
-    document.body.append(made);
-    return made;
-  };
+  """ + CANVAS + """
   const flown = globalThis.flown = { frames: 0, longest: 0, task: 0, gpu: 0, pop: 0, errors: [], done: false };
   new PerformanceObserver((list) => {
     for (const { duration } of list.getEntries()) flown.task = Math.max(flown.task, duration);
   }).observe({ type: 'longtask' });
   const began = performance.now();
   const modar = await load('%(bundle)s');
-  const view = await View.create(modar, { picture: canvas(), models: canvas(), fixedLight: true, maxBytes: %(bytes)d });
+  const view = await View.create(modar, { picture: canvas(640, 480), models: canvas(640, 480), fixedLight: true, maxBytes: %(bytes)d });
   await view.whole;
   flown.shown = (performance.now() - began) / 1000;
   const { low, high } = view.bounds(0);

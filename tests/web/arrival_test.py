@@ -13,19 +13,14 @@ import unittest
 import urllib.parse
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
-from browser import Browser, Quiet  # noqa: E402
+from browser import CANVAS, Browser, Quiet  # noqa: E402
 from programs import COVER, POTTERY, QUICK, ProgramTest  # noqa: E402
 
 HEADER, PIECE = 64, 64
 # {before, coarse, whole: hashes of what is drawn; events; error}
 DRAW = """(async () => {
   const [{ load }, { View }] = await Promise.all([import('/modar.js'), import('/modar-view.js')]);
-  const canvas = () => {
-    const made = document.createElement('canvas');
-    Object.assign(made.style, { position: 'absolute', width: '640px', height: '480px' });
-    document.body.append(made);
-    return made;
-  };
+  """ + CANVAS + """
   const hash = async (view) => {
     view.drawFrom(0, Float32Array.of(1, 0, 0, 0, 0, 0.8, -0.6, 0, 0, 0.6, 0.8, 0, 0, 0, -1.6, 1), 300);
     const bytes = await (await view.photograph('image/png')).arrayBuffer();
@@ -35,7 +30,7 @@ DRAW = """(async () => {
   let modar;
   try {
     modar = await load(%s, { simd: %s, onProgress: (...progress) => got.push(progress) });
-    const view = await View.create(modar, { simd: modar.kind === 'simd', picture: canvas(), models: canvas() });
+    const view = await View.create(modar, { simd: modar.kind === 'simd', picture: canvas(640, 480), models: canvas(640, 480) });
     drawn.patterns = view.patterns.map(({ name }) => name);
     const coarse = new Promise((resolve) => view.addEventListener('refined', () => resolve(hash(view)), { once: true }));
     view.addEventListener('refined', () => { drawn.refined = (drawn.refined ?? 0) + 1; });

@@ -22,6 +22,13 @@ FLAGS = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-ang
          "--disable-component-update", "--disable-default-apps", "--disable-sync", "--hide-scrollbars",
          "--force-color-profile=srgb", "--remote-debugging-pipe"]
 # An element of a page, or of the viewer in it.
+# A new canvas on the page, for View.create().
+CANVAS = """const canvas = (width, height) => {
+    const made = document.createElement('canvas');
+    Object.assign(made.style, { position: 'absolute', width: `${width}px`, height: `${height}px` });
+    document.body.append(made);
+    return made;
+  };"""
 PART = """globalThis.part = (id) => document.getElementById(id)
   ?? document.querySelector('modar-viewer').shadowRoot.getElementById(id)"""
 

@@ -16,7 +16,7 @@ import urllib.parse
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 from arrival_test import flipped, pieces_of  # noqa: E402
-from browser import Browser, Quiet  # noqa: E402
+from browser import CANVAS, Browser, Quiet  # noqa: E402
 from programs import COVER, QUICK, ProgramTest  # noqa: E402
 
 STEPS = 72  # squares along a side of each ground
@@ -24,12 +24,7 @@ BUDGET = 300_000  # bytes: one of them from near, and what is drawn until it has
 # Opens a view of a bundle, then draws it from places above the ground, [x, y, height] in its plane, each until nothing more comes.
 LOOK = """(async () => {
   const [{ load }, { View }] = await Promise.all([import('/modar.js'), import('/modar-view.js')]);
-  const canvas = () => {
-    const made = document.createElement('canvas');
-    Object.assign(made.style, { position: 'absolute', width: '320px', height: '240px' });
-    document.body.append(made);
-    return made;
-  };
+  """ + CANVAS + """
   const from = ([x, y, height]) => Float32Array.of(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -x, -y, -height, 1);
   const hash = async (view, place) => {
     view.drawFrom(0, from(place), 300);
@@ -41,7 +36,7 @@ LOOK = """(async () => {
   let modar;
   try {
     modar = await load(%(source)s);
-    const view = await View.create(modar, { picture: canvas(), models: canvas(), fixedLight: true, maxBytes: %(budget)d });
+    const view = await View.create(modar, { picture: canvas(320, 240), models: canvas(320, 240), fixedLight: true, maxBytes: %(budget)d });
     await view.whole;
     let refined = performance.now();
     view.addEventListener('refined', () => { refined = performance.now(); });
