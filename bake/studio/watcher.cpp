@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kLook(100);
+constexpr std::chrono::milliseconds kLook(25);
 constexpr int kRest = 20;                      // times what a look took: 5 % of a core at most
 constexpr std::size_t kMostWatched = 100'000;  // that are looked at
 
@@ -68,7 +68,7 @@ void Watcher::watch(const std::function<void(bool)>& changed) {
   FolderState last = state_of(folder_);
   auto rest = Clock::duration(kLook);
   for (auto next = Clock::now() + rest; !ended_;) {
-    std::this_thread::sleep_for(kLook / 4);
+    std::this_thread::sleep_for(kLook);
     if (Clock::now() < next) continue;
     const auto start = Clock::now();
     const FolderState now = state_of(folder_);

@@ -3,7 +3,8 @@
 
     studio.py [--models N] [--pictures N] [--runs N]
 
-Prints JSON, medians in ms: first_page (an empty folder, until its first screen is drawn), open (a baked project of 200 models and 100
+Prints JSON, medians in ms: first_page (an empty folder, until its first screen is drawn), blank_page (the same of a page without anything to do: the
+browser's own share), open (a baked project of 200 models and 100
 pictures, until its cards are there), scroll_frame (while that list is scrolled from end to end, and its models are drawn), corner (a
 dragged corner, until the rectified preview is drawn) and handle (a dragged handle, until the model is drawn: the event's own time);
 corner_worst and handle_worst are the worst. changed: from a model that is written by hand until the stage draws it, less the bake's own time as its event tells it.
@@ -31,7 +32,14 @@ from studio_test import WATCH, wall  # noqa: E402
 
 # A bake in seconds: the page shows what there is, whatever it took.
 QUICK = '[bake]\nloop-views = 8\nscore = false\nlods = 1\nparameters = ["none"]\n\n'
-PAINTED = "new Promise((done) => requestAnimationFrame(() => setTimeout(() => done(performance.now()))))"
+# When what is waited for was drawn: looked at in the page, at each of its frames.
+PAINTED = """(() => {{
+  const look = () => requestAnimationFrame(() => {{
+    if ({ready}) setTimeout(() => {{ globalThis.paintedBy = performance.now(); }});
+    else look();
+  }});
+  look();
+}})()"""
 SCROLL = """(async () => {
   const box = [...document.querySelectorAll('*')].find((e) => e.scrollHeight > e.clientHeight + 400 && /auto|scroll/.test(getComputedStyle(e).overflowY));
   const times = [];
@@ -45,21 +53,26 @@ SCROLL = """(async () => {
 })()"""
 
 
-def opened(folder, project, ready):
-    """A studio of a project, a browser that shows it, and the ms that the page took from its first byte."""
+def opened(folder, project, ready, page="?lang=en"):
+    """A studio of a project, a browser that shows it, and the ms that the page took from its navigation."""
     studio = Studio(project)
     hand = Hand(folder / f"profile-{project.name}", (1280, 720))
-    hand.open(studio.address + "?lang=en")
-    hand.wait(ready, "the first screen")
-    return studio, hand, hand.run(f"{ready} && {PAINTED}")
+    hand.call("Page.addScriptToEvaluateOnNewDocument", source=PAINTED.format(ready=ready))
+    hand.open(studio.address + page)
+    hand.wait("globalThis.paintedBy", "the first screen")
+    return studio, hand, hand.run("paintedBy")
 
 
-def first_page(folder, number):
-    project = folder / f"empty-{number}"
-    studio, hand, ms = opened(folder, project, "document.querySelector('.welcome')")
-    hand.close()
-    studio.end()
-    return ms
+def first_pages(folder, runs):
+    """Medians of the first screen, and of its words alone, a text that the browser shows as it is; in turns."""
+    taken = []
+    for i in range(2 * runs):
+        ready, page = ("document.querySelector('.welcome')", "?lang=en") if i % 2 else ("document.body", "words/en.json")
+        studio, hand, ms = opened(folder, folder / f"empty-{i}", ready, page)
+        hand.close()
+        studio.end()
+        taken.append(ms)
+    return statistics.median(taken[1::2]), statistics.median(taken[::2])
 
 
 def large(folder, models, pictures):
@@ -147,7 +160,7 @@ def main():
     figures = {}
     with tempfile.TemporaryDirectory(prefix="modar-studio-", ignore_cleanup_errors=True) as temporary:
         folder = pathlib.Path(temporary)
-        figures["first_page"] = statistics.median(first_page(folder, i) for i in range(options.runs))
+        figures["first_page"], figures["blank_page"] = first_pages(folder, options.runs)
         figures["open"], figures["scroll_frame"] = large(folder, options.models, options.pictures)
         project = folder / "one"
         project.mkdir()

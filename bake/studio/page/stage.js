@@ -46,6 +46,8 @@ export class Stage {
   #view = null;
   #layers = null;
   #loads = 0;
+  /** What draws the next bundle: {layers, give, view}. */
+  #next = null;
   #eye = { ...EYES.phone, zoom: 1 };
   #target = [0, 0, 0];
   #radius = 1;
@@ -84,18 +86,29 @@ export class Stage {
     this.observer.disconnect();
     cancelAnimationFrame(this.#frame);
     ++this.#loads;
+    this.#drop(this.#next?.layers);
     this.#drop(this.#layers);
+  }
+
+  /** Opens a context and an engine for the next bundle, which takes as long as a bake where no graphics card helps. */
+  #prepare() {
+    const layers = canvases();
+    this.dom.querySelector('.layers').append(layers.picture, layers.models);
+    layers.models.style.opacity = layers.picture.style.opacity = 0;
+    let give;
+    const view = View.create(new Promise((done) => { give = done; }), { ...layers, fixedLight: true });
+    view.catch(() => {});  // told by load()
+    return { layers, give, view };
   }
 
   /** A bundle takes the place of the one that is drawn once it can be drawn itself. baked: scenes as it has them, in its order. */
   async load(bytes, baked) {
     const load = ++this.#loads;
-    const layers = canvases();
-    const box = this.dom.querySelector('.layers');
-    box.append(layers.picture, layers.models);
-    layers.models.style.opacity = layers.picture.style.opacity = 0;
+    const { layers, give, view: made } = this.#next ?? this.#prepare();
+    this.#next = null;
     try {
-      const view = await View.create(bytes, { ...layers, fixedLight: true });
+      give(bytes);
+      const view = await made;
       if (load !== this.#loads) {
         this.#drop(layers);
         return;
@@ -108,6 +121,7 @@ export class Stage {
       this.#own = 0;
       layers.models.style.opacity = 1;
       this.draw(true);
+      setTimeout(() => { if (load === this.#loads) this.#next = this.#prepare(); });  // once it is seen
     } catch (error) {
       this.#drop(layers);
       if (load === this.#loads) this.told.failed(error);
