@@ -10,8 +10,8 @@ namespace modar {
 
 /// Linear light, top row first, four floats a pixel: red, green, blue, each times (alpha +
 /// kAlphaFloor), and alpha, all for white = 1. The floor keeps the colour
-/// of transparent pixels; 1/4096 is small beside the smallest alpha that shows, 1/255, and far from
-/// where floats lose digits. Set by hand.
+/// of transparent pixels; 1/4096 is a sixteenth of the smallest alpha that shows, 1/255, and leaves
+/// colours half of a float's 24 bits.
 struct LinearImage {
   static constexpr float kAlphaFloor = 1.0F / 4096;
   std::uint32_t width = 0;

@@ -12,7 +12,7 @@ namespace {
 constexpr float kRatio = 0.8f;      // Lowe's, of the best match's distance to the second best's
 constexpr double kInlierPx = 3;     // OpenCV's default threshold
 constexpr int kOrbFeatures = 2000;  // of the ModAR paper's set orb-2000
-constexpr int kFewestInliers = 12;  // the 8 of the ModAR paper pass on clutter. Set by hand
+constexpr int kFewestInliers = 12;  // the 8 of the ModAR paper pass on clutter
 
 cv::Mat matrix_of(const GrayImage& image) {
   return {image.height, image.width, CV_8UC1, const_cast<std::uint8_t*>(image.pixels),

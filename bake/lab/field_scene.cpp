@@ -184,7 +184,7 @@ void compress(int quality, cv::Mat& frame) {
 }  // namespace
 
 std::vector<FieldCondition> field_conditions() {
-  // Strengths from mild to where trackers break, as a phone indoors shows them. Set by hand.
+  // The bench's own choice: strengths from mild to where trackers break, as a phone indoors shows.
   return {{.name = "plain"},
           {.name = "motion 6 px", .motion_px = 6},
           {.name = "motion 12 px", .motion_px = 12},

@@ -56,8 +56,8 @@ GrayPicture edition_of(const GrayImage& pattern, const GrayImage& other);
 /// small blocks each turned by half a turn.
 GrayPicture language_of(const GrayImage& pattern);
 
-/// A hand-held camera's path: slow sines of all six parameters about a pose. Set by hand so that
-/// the pattern stays in the frame and moves by up to 15 pixels a frame at speed 1.
+/// A hand-held camera's path: slow sines of all six parameters about a pose, of such amplitudes
+/// that the pattern stays in the frame and moves by up to 15 pixels a frame at speed 1.
 class HandPath {
  public:
   HandPath(const Pose& middle, Random& random);

@@ -11,7 +11,7 @@ namespace modar {
 namespace {
 
 // Sizes and tilts between those that every picture of the test data is recognised at and those that
-// none is; finer steps than the spread of a pattern's own results gain nothing. Set by hand.
+// none is; finer steps than the spread of a pattern's own results gain nothing.
 constexpr double kLargest = 150;  // frame pixels: root of the area of the nearest views
 constexpr double kStep = 1.15;    // from one size to the next
 constexpr int kSizes = 10;

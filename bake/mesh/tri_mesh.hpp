@@ -53,7 +53,7 @@ struct TriMesh {
 
 /// How far uv may leave [0,1] and still count as inside: half a texel at 4096, which is what
 /// exporters' rounding leaves at a border. Larger clamps textures that repeat by a sliver; smaller
-/// repeats (and so resizes to powers of two) textures that do not. Set by hand.
+/// repeats (and so resizes to powers of two) textures that do not.
 inline constexpr double kUvSlack = 1e-4;
 
 /// For each material, whether any of its triangles samples outside of [0,1].

@@ -26,7 +26,7 @@ namespace modar {
 namespace {
 
 // Points of a pattern that are searched for, and the fewest that make a view: more slow the search
-// down, fewer let a wrong one weigh. Set by hand.
+// down; of 30, a wrong one weighs a thirtieth.
 constexpr int kMostPoints = 300;
 constexpr std::size_t kFewestPoints = 30;
 constexpr double kMostDistortion = 4.0;  // pixels that a lens may move points off a homography

@@ -18,7 +18,7 @@ std::vector<GrayPicture> easy_views(const NamedPattern& pattern, const Confusion
   const Camera camera = default_camera(options.width, options.height);
   const double own = 1.0 * pattern.picture.width * pattern.picture.height;
   // The pattern fills about half of the frame's height and is tilted by up to 35 degrees: easy
-  // views, in which a likeness shows. Set by hand.
+  // views, in which a likeness shows.
   const double side = 0.5 * std::min(options.width, options.height);
   SceneBand band;
   band.area_low = 0.5 * side * side / own;

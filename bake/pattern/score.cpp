@@ -26,7 +26,8 @@ constexpr int kViewMargin = 24;
 // are the same feature: as in the bake, which chooses by them.
 constexpr double kSamePlace = 3;
 constexpr int kSameCode = 64;
-// Cells on a side of the grid that features should cover, for the cause "spread". Set by hand.
+// Cells on a side of the grid that features should cover, for the cause "spread": of the 60
+// features of a good one (the cause "texture"), each holds one or two.
 constexpr int kSpreadGrid = 6;
 // Root of the area, in frame pixels, at which tilts are tried: large enough that the size does not
 // limit them.

@@ -37,7 +37,7 @@ double easy_distance(const GrayImage& picture, const Camera& camera) {
 }
 
 /// All values of all bands. The ranges begin where every pattern works and end where none does; the
-/// steps trade resolution for time. Set by hand.
+/// steps trade resolution for time.
 class Bands {
  public:
   Bands(const GrayImage& picture, const Camera& camera, bool curved)

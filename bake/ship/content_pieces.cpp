@@ -8,7 +8,8 @@ namespace modar {
 namespace {
 
 // Sizes trade what an update downloads (small pieces) against recipe bytes and requests (large
-// ones). Set by hand; tests/bench/ship_peers.py compares updates with casync and zchunk.
+// ones): a recipe's 64 bytes are a thousandth of a usual piece. tests/bench/ship_peers.py compares
+// updates with casync and zchunk.
 constexpr std::size_t kLeast = 8 << 10;
 constexpr std::size_t kUsual = 64 << 10;
 constexpr std::size_t kMost = 256 << 10;

@@ -21,7 +21,7 @@ namespace modar {
 namespace {
 
 /// Feature sets of a pattern up to here travel as one piece: they share most descriptors, but an
-/// update downloads them all. Set by hand, above the four sets of 2000 keypoints.
+/// update downloads them all. Above the four sets of 2000 keypoints.
 constexpr std::uint64_t kMaxPatternPiece = 4u << 20;
 
 /// Bytes: of smaller mesh objects and levels, zstd alone may be smaller.

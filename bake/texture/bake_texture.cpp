@@ -66,8 +66,8 @@ TextureLevel encode_level(const RgbaImage& image, bool alpha, const TextureOptio
   return level;
 }
 
-/// Nearly all texels are there or not: leaves, fences, letters. 0.9 is set by hand, on pictures
-/// whose soft rims take up to 6 % of the texels.
+/// Nearly all texels are there or not: leaves, fences, letters. The soft rims of such pictures take
+/// up to 6 % of the texels; a tenth is let pass.
 bool is_cut_out(const RgbaImage& image) {
   std::size_t clear = 0;
   for (std::size_t i = 3; i < image.pixels.size(); i += 4) {

@@ -16,7 +16,7 @@ namespace modar {
 namespace {
 
 /// Of a piece, at most: what a damaged one costs to fetch again, against what a coder learns within
-/// one. Set by hand.
+/// one. As large as the largest piece of a release.
 constexpr std::uint64_t kMostRaw = 256 << 10;
 /// Coded bytes of a bundle, at most: a phone decodes 0.4 MB a second, and a fast network brings
 /// more than that. What follows in the order of need travels as it is.

@@ -5,8 +5,8 @@
 namespace modar {
 namespace {
 
-/// Of the mixed predictions, so that they sum to twice of what one of them says: set by hand, the
-/// best of 0.2 to 0.3 on the pictures of assets/patterns, by 0.2 %.
+/// Of the mixed predictions, so that they sum to twice of what one of them says: the best of 0.2 to
+/// 0.3 on the pictures of assets/patterns, by 0.2 %.
 constexpr std::int32_t kFirstWeight = 65536 / 5;
 /// How fast weights follow, in 65536ths of error times input. 2, 6 and 14: 109.8, 111.8 and 117.6
 /// KB for the picture of a pattern.

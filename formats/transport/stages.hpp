@@ -13,7 +13,7 @@
 namespace modar {
 
 /// Longer side of the finest texture level of LoadStage::kShow, texels: what a model that fills a
-/// third of a phone's screen shows, for a sixteenth of the bytes of 1024. Set by hand.
+/// third of a phone's screen shows, for a sixteenth of the bytes of 1024.
 inline constexpr std::uint32_t kShownSide = 256;
 
 /// Types of sections from here on are payloads; what lies before them are tables and small text.

@@ -13,7 +13,7 @@ namespace {
 constexpr unsigned kMissingAttempts = 3;
 
 /// An attempt counts as progress if it ended so many bytes further than any before, or with the
-/// rest: a server that sends a byte now and then cannot keep a fetch busy for ever. Set by hand.
+/// rest: a server that sends a byte now and then gets an attempt for each KiB of a file at most.
 constexpr std::uint64_t kLeastProgress = 1024;
 
 }  // namespace

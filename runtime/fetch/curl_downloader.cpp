@@ -16,9 +16,10 @@ namespace {
 
 using Clock = Transfer::Clock;
 
-/// Set by hand: a few round trips of a 2G link with lost packets.
+/// Time for the first packet and the three that follow it where it is lost, after 1, 3 and 7 s
+/// (RFC 6298), and for the answer to the last over a 2G link.
 constexpr long kConnectSeconds = 15;
-/// Bytes a second below which a connection is closed after stall_s. Set by hand: 2G brings 3000.
+/// Bytes a second below which a connection is closed after stall_s: 2G brings 3000.
 constexpr long kLeastSpeed = 64;
 
 /// A PEM file of authorities, as curl and OpenSSL take it from the environment; empty: the

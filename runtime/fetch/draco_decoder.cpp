@@ -10,7 +10,7 @@
 namespace modar {
 namespace {
 
-/// Of a chunk: 16-bit indices bound its vertices; the faces bound memory (12 MB), set by hand.
+/// Of a chunk: 16-bit indices bound its vertices; the faces bound memory, 12 MB of indices.
 constexpr std::uint32_t kMaxPoints = 65536;
 constexpr std::uint32_t kMaxFaces = 1u << 20;
 

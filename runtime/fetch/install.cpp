@@ -173,7 +173,8 @@ Result<void> assemble(const Assembly& assembly, const PieceSource& source, const
 
 // --- A release ---
 
-/// Left free beyond what is needed, for folders, links and the state: set by hand.
+/// Left free beyond what is needed, for folders, links and the state: 256 blocks of 4 KiB, of which
+/// each takes one or two.
 constexpr std::uint64_t kSpareBytes = 1u << 20;
 
 /// Reports progress at most ten times a second.

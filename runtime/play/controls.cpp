@@ -16,7 +16,7 @@ Controls::Controls(const BundleView& bundle, bool outline, bool display)
 }
 
 void Controls::apply(const UserAct& act) {
-  constexpr float kStep = 1.1f;  // a key press resizes by 10 %; set by hand
+  constexpr float kStep = 1.1f;  // a key press resizes by 10 %: seven double a model
   constexpr float kMost = 20;    // and by so much at most
   constexpr float kVolume = 0.1f;
   switch (act.act) {

@@ -19,7 +19,7 @@
 namespace modar {
 namespace {
 
-constexpr double kTiltDegrees = 20;  ///< seen from a little above; set by hand
+constexpr double kTiltDegrees = 20;  ///< seen from a little above, as what stands on a table
 
 /// The ball round the origin that holds the model's chunks (model space).
 double radius_of(const BundleView& bundle, std::uint32_t model) {

@@ -11,8 +11,7 @@ namespace modar {
 namespace {
 
 // Samples along a side of a footprint, at most, which bounds a pixel at 36. Views tilted up to 3
-// times get a sample for each level pixel, the steepest baked ones (4.1) one for each 1.4. Set by
-// hand.
+// times get a sample for each level pixel, the steepest baked ones (4.1) one for each 1.4.
 constexpr int kMostSamples = 6;
 
 // Positions in a level are fixed-point numbers with 16 fractional bits, so that every machine

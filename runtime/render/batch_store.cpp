@@ -7,7 +7,8 @@
 namespace modar {
 namespace {
 
-/// More batches keep more mixes of models from being copied again, and take memory. Set by hand.
+/// More batches keep more mixes of models from being copied again; each call looks through them
+/// all. Their bytes have a bound of their own.
 constexpr std::size_t kMostBatches = 16;
 
 bool holds(const Batch& batch, std::span<const BatchPart> parts) {

@@ -13,7 +13,7 @@ namespace modar {
 namespace {
 
 /// Vertices that are widened at a time: more would cost memory (16 KB at 4 bytes each way per
-/// attribute), fewer more calls of glBufferSubData. Set by hand.
+/// attribute), fewer more calls of glBufferSubData (16 for the largest chunk).
 constexpr std::size_t kScratchVertices = 4096;
 
 /// What is wrong where vertices cannot be put as they are.

@@ -30,7 +30,7 @@ namespace {
 /// count shading, which shows long before the form does: 1024 times as much is still that. Set by
 /// hand.
 constexpr int kCoarser = 5;
-/// Halvings of such a step, in search of what fits: 4 leave 9 % of error. Set by hand.
+/// Halvings of such a step, in search of what fits: 4 leave 9 % of error.
 constexpr int kFiner = 4;
 /// Triangles of a frame, a draw call counted as some (see DrawList::cost()). Trades detail near the
 /// eye for the frame rate; the largest scans of one object, of 0.9 million, are still drawn whole.

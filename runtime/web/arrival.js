@@ -2,7 +2,7 @@
 import { ENTRY_BYTES, HEADER_BYTES } from './bundle.js';
 import { ModarError } from './engine.js';
 
-/** Times that something is asked for again, and seconds before the second time: a phone's connection breaks now and then. Set by hand. */
+/** Times that something is asked for again, and seconds before the second time: a phone's connection breaks now and then. Where one request in ten fails, one piece in a thousand is missing. */
 const TRIES = 3;
 const WAIT_S = 1;
 /** As formats/transport/recipe.hpp has them. */

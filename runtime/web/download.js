@@ -2,7 +2,7 @@
 
 /** A file's bytes come at least so fast, a second, on average over `stall` seconds: as modar-fetch asks for. */
 const LEAST_RATE = 64;
-/** Times that a file is asked for in a visit. Set by hand: a phone's connection breaks now and then. */
+/** Times that a file is asked for in a visit, as a phone's connection breaks now and then: where one request in ten fails, one file in a thousand is missing. */
 const TRIES = 3;
 
 async function read(response, skip, room, seen) {

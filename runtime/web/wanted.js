@@ -6,7 +6,7 @@ const MOST_REQUESTS = 3;
 const MOST_TOGETHER = 4;
 /** Ranges that are open at once: the view may have changed when the next ones are asked for. */
 const MOST_OPEN = 6;
-/** Seconds before something is asked for again, doubled each time up to 32. Set by hand. */
+/** Seconds before something is asked for again, as in arrival.js; doubled each time up to 32. */
 const WAIT_S = 1;
 
 export class Wanted {

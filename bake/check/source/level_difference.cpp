@@ -14,8 +14,8 @@
 namespace modar {
 namespace {
 
-/// The least share of equal bytes by which two levels count as in one order. Set by hand: damage
-/// changes few bytes, another order of vertices changes nearly all.
+/// The least share of equal bytes by which two levels count as in one order. Far from either case:
+/// damage changes few bytes, another order of vertices nearly all.
 constexpr double kSameOrder = 0.5;
 /// What nobody sees: an eighth of a texel of a picture of 1024, 3 degrees of a normal, a step of
 /// 8-bit colour, a part of the distance at which levels change.

@@ -57,8 +57,8 @@ constexpr double kShadeSlack = 8;
 constexpr int kCellSlack = 400;
 /// Of widths that were written in different units.
 constexpr double kWidthSlack = 1e-6;
-/// Codes of 256 bits that describe one corner; random ones differ in 128, rarely in less than 96.
-/// Set by hand.
+/// Of 256, by which codes of one corner may differ: random ones differ in 128 with a deviation of
+/// 8, eight of which lie between.
 constexpr std::size_t kSimilarBits = 64;
 /// The least share of a record's codes that its source gives again. Set by hand: another version
 /// of the baker may choose other views and features.

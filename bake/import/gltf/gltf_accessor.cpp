@@ -10,8 +10,8 @@
 namespace modar {
 namespace {
 
-/// Elements without a buffer behind them: a file of a few bytes could ask for any number. Set by
-/// hand: far above real files, 384 MiB of normals at most.
+/// Elements without a buffer behind them: a file of a few bytes could ask for any number. Far
+/// above real files, 384 MiB of normals at most.
 constexpr std::size_t kMostUnbacked = std::size_t{1} << 24;
 
 template <class T>

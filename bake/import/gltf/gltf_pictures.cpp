@@ -11,7 +11,7 @@ namespace modar {
 namespace {
 
 /// glTF's occlusion darkens what comes from all around and not what comes from a lamp; a colour
-/// darkens both. Half of it, set by hand: lamps and surroundings give about as much light.
+/// darkens both. Half of it, as if lamps and surroundings gave as much light.
 constexpr double kOccludedShare = 0.5;
 
 /// A picture at the size of another, where it has a path.

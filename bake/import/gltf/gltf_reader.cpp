@@ -29,8 +29,8 @@ namespace {
 
 // The scene.
 
-/// Vertices beyond which a file may not copy nodes: some bytes could ask for any number. Set by
-/// hand, far above what a phone draws.
+/// Vertices beyond which a file may not copy nodes: some bytes could ask for any number. 33 times
+/// the triangles that the device draws in a frame.
 constexpr std::size_t kMostCopied = std::size_t{1} << 25;
 constexpr int kMaxDepth = 1000;  ///< of nodes; keeps recursion within a small stack, set by hand
 

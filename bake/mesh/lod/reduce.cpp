@@ -16,7 +16,7 @@
 namespace modar {
 namespace {
 
-/// Of the source, spread evenly over its vertices. Each costs some 2 us; set by hand.
+/// Of the source, spread evenly over its vertices. Each costs some 2 us, all 0.4 s.
 constexpr std::size_t kDistanceSamples = 200000;
 
 /// Corners numbered so that each number belongs to one vertex and one material: the simplifier,

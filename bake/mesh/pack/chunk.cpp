@@ -291,8 +291,8 @@ namespace {
 
 // Boxes and cones.
 
-/// Covers the rounding of the axis to float, of the renderer's normalisation and dot product (some
-/// 1e-6); set by hand.
+/// A hundred times the rounding of the axis to float, of the renderer's normalisation and dot
+/// product (some 1e-6).
 constexpr double kConeSlack = 1e-4;
 
 /// Unit normal of triangle i, or zero where it has no area.

@@ -36,7 +36,8 @@ MaterialRecord material_record(const SourceMaterial& source) {
 
 namespace {
 
-/// Chunks per thread between two joins: more balance load better and hold more memory. Set by hand.
+/// Chunks per thread between two joins: more balance load better and hold more memory, up to 2 MB
+/// each (65,535 vertices of 16 bytes and 131,000 triangles).
 constexpr unsigned kWave = 4;
 
 /// One chunk in its final bytes, before its place in the buffers is known.

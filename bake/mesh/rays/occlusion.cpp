@@ -25,7 +25,7 @@ constexpr std::size_t kAxes = 32;
 /// vertices by 0.030, with 32 by 0.028.
 constexpr std::size_t kClusterAxes = 20;
 /// Clusters that are thicker are layers or noise, where four times as many halve the error: a solid
-/// scan has 0.034, depth maps on each other 0.17. By hand, between them.
+/// scan has 0.034, depth maps on each other 0.17, their geometric mean is 0.076.
 constexpr double kThick = 0.08;
 /// Model space, half a side is 1: farther surfaces hide nothing. Rooms seen from inside would be
 /// dark without a limit. Set by hand, on pictures.

@@ -11,7 +11,7 @@
 namespace modar {
 
 /// Beyond this many corners a concave polygon is cut into a fan, since ear clipping takes quadratic
-/// time: 2,048 corners take some milliseconds. Set by hand.
+/// time: 2,048 corners take some milliseconds.
 inline constexpr std::size_t kMaxEarCorners = 2048;
 
 /// Triangulates one polygon: a fan where it is convex, ears where it is not (Meisters, 1975); the

@@ -216,7 +216,7 @@ class VertexWeld {
   }
 
  private:
-  /// Longer lists are hashed: keeps adversarial files linear; set by hand, real ones need under 10.
+  /// Longer lists are hashed, which keeps adversarial files linear; real ones need under 10 steps.
   static constexpr std::uint32_t kMaxSteps = 64;
 
   std::uint32_t add(const Corner& key);
@@ -417,7 +417,7 @@ void weld_any(SourceModel& source, TriMesh& mesh, WeldCounts& counts) {
 
 // The way of files whose corners repeat one index (most scans): works in the source's arrays.
 
-/// Elements that a thread takes at a time: small enough to balance load, set by hand.
+/// Elements that a thread takes at a time: a million make 16 parts.
 constexpr std::size_t kElementsPerTask = 1u << 16;
 
 std::uint32_t stretches(std::size_t count) {

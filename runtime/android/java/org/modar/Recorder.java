@@ -31,7 +31,7 @@ final class Recorder {
     /** Sides are multiples of this, which some encoders ask for; of shares of the screen less than half a percent is stretched. */
     private static final int BLOCK = 16;
     private static final int FRAMES_S = 30;
-    /** A pixel: 3.3 Mbit/s at 1280 x 720, about what phones' own cameras take for half of that. Set by hand. */
+    /** A pixel: 3.3 Mbit/s at 1280 x 720, about what phones' own cameras take for half of that. */
     private static final double BITS = 0.12;
     /** At its end an encoder gives back what it holds: tries of so many microseconds each. */
     private static final int WAIT_US = 10000;
