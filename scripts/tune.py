@@ -7,7 +7,8 @@
 NAME: a constant, such as kRatio, that is defined as `constexpr TYPE NAME = NUMBER;`; with its FILE, if it is in several. --values: of
 each; default 0.5 to 2 times the present one. --jobs: benches at a time (default: a processor each); one alone measures
 times well. BENCH: of `modar-lab bench`, with its options; its inputs are read by each run, so that all values see the same frames.
-A figure of several rows ("right_pct near", "right_pct far") is their mean. The present value is marked by a star.
+A figure of several rows ("right_pct near", "right_pct far") is their mean, one beside another program's ("rms_percent/meshopt_simplify")
+the mean ratio. The present value is marked by a star.
 Builds a copy of the tree, in which the constants are variables, in build/tune (minutes the first time, then the files that use it)."""
 import argparse
 import concurrent.futures
@@ -90,19 +91,21 @@ def build(texts):
     if not (BUILD / "build.ninja").is_file():
         subprocess.run(["cmake", "-S", TREE, "-B", BUILD, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DMODAR_TESTS=OFF",
                         "-DCMAKE_UNITY_BUILD=ON", "-DCMAKE_UNITY_BUILD_BATCH_SIZE=20"], **quiet)
-    subprocess.run(["ninja", "-C", BUILD, "modar-lab", "modar-model-probe"], **quiet)
+    subprocess.run(["ninja", "-C", BUILD, "modar", "modar-lab", "modar-model-probe", "modar_video_library"], **quiet)
 
 
 def figures(name, value, bench):
-    """The bench's figures with that value of one constant: the mean of the rows of each."""
+    """The bench's figures with that value of one constant: the mean of the rows of each, or of their ratios."""
     done = subprocess.run([BUILD / "bin/modar-lab", "bench", *bench, "--json", "--quiet"], capture_output=True, text=True,
                           env={**os.environ, f"MODAR_TUNED_{name}": repr(value)})
     if done.returncode != 0:
         sys.exit(f"tune.py: with {name} = {value}: {done.stderr.strip()}")
     rows = {}
     for row in json.loads(done.stdout):
-        if row["ours"] is not None:
-            rows.setdefault(row["measure"].split()[0], []).append(row["ours"])
+        measure = next(word for word in row["measure"].split() if not word[0].isdigit())  # "1/2 rms_percent/meshopt_simplify scan"
+        figure = row["ratio" if "/" in measure else "ours"]
+        if figure is not None:
+            rows.setdefault(measure, []).append(figure)
     return {measure: sum(all_rows) / len(all_rows) for measure, all_rows in rows.items()}
 
 
