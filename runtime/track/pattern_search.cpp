@@ -15,7 +15,7 @@ namespace {
 
 // Features that agree with a homography, below which nothing is detected.
 // Trades small and covered patterns for time in clutter, where the photometric check then has to
-// refuse what chance brings. By hand.
+// refuse what chance brings. Swept on area 0.02-0.05: 56.7 % right with 4 and 6, 45.8 % with 12.
 constexpr int kMinInliers = 6;
 // A place whose finest patches do not fit: so end 3 of 2,328 true detections, and every false one
 // (in 11,000 cluttered frames no place fitted on the finest level). So much of it must correlate,
@@ -30,20 +30,21 @@ constexpr double kVouchedRms = 3.0;  // the same of features that speak for a pl
 // 89.6 % right with 60 and with 45, 87.5 without a limit; another seed, and small and tilted
 // patterns, are the same with all three.
 constexpr int kSparePercent = 60;
-// Reprojection RMS after patches took over, of that before: above the first the place loses
-// kDoubtPenalty points of its score, above the second (and a sigma) all. Patches on the edge of an
-// occluder draw a pose away from what all features say. By hand on half-covered patterns.
-constexpr double kDoubtfulRms = 1.5;
+// Reprojection RMS after patches took over, of that before (and a sigma), above which the place
+// loses its score: patches on the edge of an occluder draw a pose away from what all features say.
+// Swept on 70 % covered: 89.2 % right with 1.5 and 3, 88.3 % with 6 and without.
 constexpr double kWrongRms = 3.0;
-constexpr int kDoubtPenalty = 8;
 // Divides the score of a place whose patches contradict each other, so that nearly any other is
-// better. By hand: as kDoubtPenalty.
+// better. Swept on 70 % covered, with a known camera: 87.5 % right with 1 to 1000, but with 1 one
+// pose of 120 fewer is found.
 constexpr int kRestlessShare = 8;
-// The same, of two mirror images: both are tried up to it.
+// Of two mirror images, reprojection RMS of one by that of the better one, up to which it is tried,
+// too. Swept on 70 % covered: 86.7, 89.2 and 89.2 % right with 0.75, 1.5 and 3.
 constexpr double kMirrorRms = 1.5;
 // Inlier ratio of patches from which nothing hides the pattern, so that further hypotheses are not
-// tried, and from which the mirror image cannot be right. Lower saves time, higher finds better
-// places of patterns in part hidden. By hand.
+// tried, and from which the mirror image cannot be right. Lower saves time. Swept on 70 % covered:
+// 89.2 % right from 0.6 and 0.7 to none at all, as in all other bands; without kComplete, a frame
+// in full view takes 1.5 to 1.9 times as long.
 constexpr double kUnoccluded = 0.85;
 constexpr double kComplete = 0.95;
 // Frame pixels by which features lie beside a plane, at least and at most, and how many bend it: a
@@ -54,7 +55,8 @@ constexpr double kBesideMost = 60.0;
 constexpr int kBesideCount = 20;
 constexpr int kBesideShare = 8;
 // A plane map replaces the best pose if it correlates in so many percent more, and with so many
-// inliers: it has two parameters more to bend. By hand, on photos of unknown focal length.
+// inliers: it has two parameters more to bend. Swept on 70 % covered: 89.2 % right with 10 to 40,
+// and with 8 to 32.
 constexpr int kMapGain = 20;
 constexpr int kMapInliers = 16;
 
@@ -386,7 +388,6 @@ PatternSearch::PoseCandidate PatternSearch::refine_start(const TrackedPattern& p
        {SearchRadius::kNear, SearchRadius::kFrame, SearchRadius::kFar}) {
     PoseCandidate now = evaluate_start(pattern, frame, radius, start);
     const double after = reprojection_rms(camera_, now.pose, points);
-    if (after > kDoubtfulRms * before + 1.0) now.score -= kDoubtPenalty;
     if (after > kWrongRms * (before + 1.0)) now.score = 0;
     if (radius == SearchRadius::kNear || now.score > best.score) best = now;
     if (best.finest && !best.restless) break;
