@@ -353,6 +353,8 @@ Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& 
   ShapedModel shaped;
   MODAR_ASSIGN(shaped.stand_ins, pack_stand_ins(*chunked, {stand_ins, plan->kind}, texture_sides,
                                                 pack_options, report));
+  // Smaller models are drawn whole, and chunks that share a range are drawn in one call.
+  pack_options.prefixes = triangles_in(*chunked) > level_options.many_triangles;
   MODAR_ASSIGN(shaped.model, pack(*chunked, texture_sides, pack_options, report));
   tell_positions(*chunked, shaped.model, plan->kind, request, report);
   return shaped;

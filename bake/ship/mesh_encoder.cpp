@@ -9,6 +9,8 @@
 #include <zstd.h>
 
 #include "formats/component.hpp"
+#include "formats/transport/chunk_order.hpp"
+#include "formats/transport/coded_bytes.hpp"
 #include "formats/transport/vertex_streams.hpp"
 #include "modar/piece.hpp"
 
@@ -281,6 +283,39 @@ int choose_normal_bits(std::span<const std::byte> vertices, std::span<const std:
   return best;
 }
 
+/// A chunk in the order of ChunkOrderer, and the group of each vertex; none where all are of one.
+struct UngroupedChunk {
+  std::vector<std::byte> vertices;
+  std::vector<std::uint16_t> indices;
+  std::vector<std::byte> groups;
+};
+
+/// Nothing where vertices are not in groups whose order inside is ChunkOrderer's.
+std::optional<UngroupedChunk> ungroup(std::span<const std::byte> vertices,
+                                      std::span<const std::uint16_t> indices, std::size_t stride) {
+  constexpr std::size_t kMostGroups = 256;
+  UngroupedChunk chunk;
+  chunk.indices.assign(indices.begin(), indices.end());
+  ChunkOrderer orderer;
+  const auto order = orderer.order(vertices, static_cast<std::uint32_t>(stride), chunk.indices);
+  if (order.size() * stride != vertices.size()) return std::nullopt;
+  std::vector<std::uint16_t> place(order.size());
+  for (std::size_t v = 0; v < order.size(); ++v) {
+    place[order[v]] = static_cast<std::uint16_t>(v);
+    const auto vertex = vertices.subspan(order[v] * stride, stride);
+    chunk.vertices.insert(chunk.vertices.end(), vertex.begin(), vertex.end());
+  }
+  // A group ends where the order goes back.
+  std::size_t group = 0;
+  std::vector<std::byte> groups(place.size());
+  for (std::size_t v = 0; v < place.size(); ++v) {
+    if (v > 0 && place[v] < place[v - 1] && ++group == kMostGroups) return std::nullopt;
+    groups[place[v]] = static_cast<std::byte>(group);
+  }
+  if (group > 0) chunk.groups = std::move(groups);
+  return chunk;
+}
+
 bool restores(std::span<const std::byte> object, std::span<const std::byte> vertices,
               std::span<const std::uint16_t> indices) {
   const auto chunk = decode_mesh_object(object);
@@ -297,9 +332,18 @@ std::optional<std::vector<std::byte>> encode_mesh_object(std::span<const std::by
                                                          const LayoutRecord& layout) {
   auto streams = plan_streams(layout.stride, std::span(layout.attributes, layout.attribute_count));
   if (!streams || vertices.empty()) return std::nullopt;
-  const int bits = choose_normal_bits(vertices, indices, layout, *streams);
-  auto object = MeshObjectMaker(vertices, indices, layout, std::move(*streams)).make(bits);
-  if (!object || !restores(*object, vertices, indices)) return std::nullopt;
+  const auto chunk = ungroup(vertices, indices, layout.stride);
+  if (!chunk) return std::nullopt;
+  const int bits = choose_normal_bits(chunk->vertices, chunk->indices, layout, *streams);
+  auto object =
+      MeshObjectMaker(chunk->vertices, chunk->indices, layout, std::move(*streams)).make(bits);
+  if (!object) return std::nullopt;
+  if (!chunk->groups.empty()) {
+    object->front() = std::byte{2};  // MeshObjectHeader::version
+    const std::vector<std::byte> coded = encode_bytes(chunk->groups, 1);
+    object->insert(object->end(), coded.begin(), coded.end());
+  }
+  if (!restores(*object, vertices, indices)) return std::nullopt;
   return object;
 }
 

@@ -32,7 +32,8 @@ std::optional<std::vector<std::byte>> encode_draco(std::span<const DracoInput> a
                                                    std::uint32_t vertex_count, int normal_bits);
 
 /// A mesh object, verified by decoding it; nothing if the chunk cannot travel this way (layout, -0,
-/// or an order that is not ChunkOrderer's). vertices: of `layout`. indices: local to them.
+/// or an order that is not ChunkOrderer's in groups of vertices). vertices: of `layout`. indices:
+/// local to them.
 std::optional<std::vector<std::byte>> encode_mesh_object(std::span<const std::byte> vertices,
                                                          std::span<const std::uint16_t> indices,
                                                          const LayoutRecord& layout);

@@ -4,6 +4,7 @@
 #include "formats/transport/chunk_order.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstring>
 
@@ -229,6 +230,18 @@ void LevelOrderer::order(std::span<std::uint16_t> indices, std::uint32_t vertex_
   const auto numbers = std::span<const std::uint16_t>(numbers_).first(vertex_count);
   const auto old = orderer_.order(std::as_bytes(numbers), sizeof numbers_[0], indices);
   for (std::uint16_t& index : indices) index = old[index];
+}
+
+std::vector<std::uint16_t> numbers_by_group(std::span<const std::byte> groups) {
+  std::array<std::uint32_t, 257> next{};  // of each group: the next number
+  for (const std::byte group : groups) ++next[std::to_integer<std::size_t>(group) + 1];
+  for (std::size_t g = 1; g < next.size(); ++g) next[g] += next[g - 1];
+  std::vector<std::uint16_t> numbers;
+  numbers.reserve(groups.size());
+  for (const std::byte group : groups) {
+    numbers.push_back(static_cast<std::uint16_t>(next[std::to_integer<std::size_t>(group)]++));
+  }
+  return numbers;
 }
 
 std::uint64_t count_cache_misses(std::span<const std::uint16_t> indices, std::uint32_t cache_size) {

@@ -79,6 +79,10 @@ class LevelOrderer {
   std::vector<std::uint16_t> numbers_;
 };
 
+/// Numbers vertices by their groups, the lowest first, and inside a group in the order that they
+/// have: of each its new number. groups: one a vertex, at most 65536.
+std::vector<std::uint16_t> numbers_by_group(std::span<const std::byte> groups);
+
 /// Vertices that a first-in-first-out cache of `cache_size` entries transforms for these triangles;
 /// divided by the triangles it is the average cache miss ratio (0.5 is ideal, 3 the worst).
 std::uint64_t count_cache_misses(std::span<const std::uint16_t> indices, std::uint32_t cache_size);

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cstring>
+#include <string>
 
 #include <meshoptimizer.h>
 #include <zstd.h>
 
 #include "formats/transport/chunk_order.hpp"
+#include "formats/transport/coded_bytes.hpp"
 #include "formats/transport/feature_text.hpp"
 #include "formats/transport/vertex_streams.hpp"
 #include "modar/arriving_bundle.hpp"
@@ -152,6 +154,7 @@ struct ObjectParts {
   std::span<const std::byte> draco;
   std::span<const std::byte> fine;
   std::span<const std::byte> corrections;
+  std::span<const std::byte> groups;  ///< coded; of version 2
 };
 
 Result<ObjectParts> split_object(std::span<const std::byte> object) {
@@ -161,12 +164,18 @@ Result<ObjectParts> split_object(std::span<const std::byte> object) {
   const MeshObjectHeader& h = parts.header;
   const std::uint64_t size = sizeof h + std::uint64_t{h.attribute_count} * sizeof(AttributeRecord) +
                              h.draco_size + h.fine_size + h.corrections_size;
-  if (h.version != 1 || h.reserved != 0 || h.attributes_reserved != 0 || h.attribute_count > 8 ||
+  if (h.version > 2) {
+    return fail(ExitCode::kUnsupported, "mesh.version", "mesh object",
+                "it is of version " + std::to_string(h.version) + ", not 1 or 2",
+                "use a newer modar-fetch");
+  }
+  if (h.version == 0 || h.reserved != 0 || h.attributes_reserved != 0 || h.attribute_count > 8 ||
       h.stride == 0 || h.stride > kMaxVertexStride || h.normal_bits > 16 ||
       h.loose_triangles > kMaxLooseTriangles) {
     return broken("mesh.header", "its header is out of range");
   }
-  if (size != object.size()) return broken("mesh.truncated", "its parts do not add up to its size");
+  if (size > object.size() || (h.version == 1) != (size == object.size()))
+    return broken("mesh.truncated", "its parts do not add up to its size");
   parts.attributes.resize(h.attribute_count);
   std::size_t at = sizeof h;
   const auto take = [&](std::size_t bytes) {
@@ -178,6 +187,7 @@ Result<ObjectParts> split_object(std::span<const std::byte> object) {
   parts.draco = take(h.draco_size);
   parts.fine = take(h.fine_size);
   parts.corrections = take(h.corrections_size);
+  parts.groups = object.subspan(at);
   return parts;
 }
 
@@ -268,16 +278,26 @@ Result<void> write_points(const DracoMesh& mesh, const std::vector<VertexStream>
   return {};
 }
 
-/// Orders the points and triangles as the bake ordered the chunk.
-MeshBytes order_chunk(std::span<const std::byte> vertices, std::size_t stride,
-                      std::vector<std::uint16_t> indices) {
-  MeshBytes chunk;
+/// Orders the points and triangles as the bake ordered the chunk. coded_groups: may be empty.
+Result<MeshBytes> order_chunk(std::span<const std::byte> vertices, std::size_t stride,
+                              std::vector<std::uint16_t> indices,
+                              std::span<const std::byte> coded_groups) {
   ChunkOrderer orderer;
-  for (const std::uint16_t old :
-       orderer.order(vertices, static_cast<std::uint32_t>(stride), indices)) {
-    const auto vertex = vertices.subspan(old * stride, stride);
-    chunk.vertices.insert(chunk.vertices.end(), vertex.begin(), vertex.end());
+  const auto order = orderer.order(vertices, static_cast<std::uint32_t>(stride), indices);
+  std::vector<std::byte> groups(order.size());
+  if (!coded_groups.empty()) {
+    auto decoded = decode_bytes(coded_groups, order.size(), 1);
+    if (!decoded) return broken("mesh.groups", "the groups of its vertices do not unpack");
+    groups = *std::move(decoded);
   }
+  const std::vector<std::uint16_t> numbers = numbers_by_group(groups);
+  MeshBytes chunk;
+  chunk.vertices.resize(order.size() * stride);
+  for (std::size_t v = 0; v < order.size(); ++v) {
+    std::memcpy(chunk.vertices.data() + numbers[v] * stride, vertices.data() + order[v] * stride,
+                stride);
+  }
+  for (std::uint16_t& index : indices) index = numbers[index];
   chunk.indices = std::move(indices);
   return chunk;
 }
@@ -329,7 +349,7 @@ Result<MeshBytes> decode_mesh_object(std::span<const std::byte> object) {
       indices.push_back(static_cast<std::uint16_t>(mesh.point_count + i));
     }
   }
-  return order_chunk(vertices, stride, std::move(indices));
+  return order_chunk(vertices, stride, std::move(indices), parts.groups);
 }
 
 }  // namespace modar

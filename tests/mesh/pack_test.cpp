@@ -12,6 +12,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "bake/mesh/lod/mesh_levels.hpp"
 #include "tests/import/samples.hpp"
 #include "tests/mesh/stages.hpp"
 
@@ -63,6 +64,53 @@ TEST(Pack, KnownValuesByteForByte) {
   EXPECT_EQ(mesh.record.position_error_max, 0.0);
   EXPECT_EQ(mesh.record.uv_error_max_texels, 0.0f);
   EXPECT_LT(mesh.record.normal_error_max_deg, 0.4f);
+}
+
+/// Decoded corners of a level's triangles.
+std::multiset<std::array<float, 3>> corners_of(const PackedMesh& mesh, const LevelRecord& level) {
+  std::vector<std::uint16_t> indices(level.index_count);
+  std::memcpy(indices.data(), mesh.indices.data() + level.index_offset, 2 * indices.size());
+  std::multiset<std::array<float, 3>> corners;
+  for (const std::uint16_t index : indices) {
+    EXPECT_LT(index, level.vertex_count);
+    const glm::vec3 p = position_at(mesh, level.vertex_offset / mesh.layout.stride + index);
+    corners.insert({p.x, p.y, p.z});
+  }
+  return corners;
+}
+
+/// Where levels use prefixes they have the same triangles, over the fewest vertices that a prefix
+/// can have, and each chunk has its own range.
+TEST(Pack, CoarserLevelsUseTheFirstVertices) {
+  ChunkedMesh mesh = chunked(welded(parse(grid(40, 2))), 500);
+  Report report;
+  LevelOptions levels;
+  levels.levels = 3;
+  ASSERT_TRUE(make_levels(mesh, levels, report));
+  const PackedMesh usual = packed(mesh);
+  PackOptions options;
+  options.prefixes = true;
+  const auto made = pack(mesh, std::vector<std::uint32_t>(2, 1024), options, report);
+  ASSERT_TRUE(made);
+  ASSERT_EQ(made->levels.size(), usual.levels.size());
+  EXPECT_EQ(made->vertices.size(), usual.vertices.size());
+  std::size_t shorter = 0;
+  std::set<std::uint64_t> ranges;
+  for (const ChunkRecord& chunk : made->chunks) {
+    std::set<std::uint16_t> used;
+    for (std::uint32_t l = chunk.level_count; l-- > 0;) {
+      const LevelRecord& level = made->levels[chunk.first_level + l];
+      EXPECT_EQ(corners_of(*made, level), corners_of(usual, usual.levels[chunk.first_level + l]));
+      EXPECT_EQ(level.vertex_offset, made->levels[chunk.first_level].vertex_offset);
+      std::vector<std::uint16_t> indices(level.index_count);
+      std::memcpy(indices.data(), made->indices.data() + level.index_offset, 2 * indices.size());
+      used.insert(indices.begin(), indices.end());
+      EXPECT_EQ(used.size(), level.vertex_count) << "of level " << l;
+      shorter += level.vertex_count < made->levels[chunk.first_level].vertex_count ? 1u : 0u;
+    }
+    EXPECT_TRUE(ranges.insert(made->levels[chunk.first_level].vertex_offset).second);
+  }
+  EXPECT_GE(shorter, made->chunks.size());
 }
 
 TEST(Pack, LayoutsTakeWhatTheModelHas) {

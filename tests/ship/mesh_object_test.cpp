@@ -153,6 +153,49 @@ TEST(MeshObject, RestoresWhatNoEditorWouldMake) {
   }
 }
 
+/// A chunk whose coarser levels use the first vertices: a quarter, then another one, then the rest.
+Mesh grouped(Mesh mesh) {
+  mesh.order();
+  std::mt19937 random(3);
+  std::vector<std::byte> groups(mesh.vertices.size() / mesh.layout.stride);
+  for (std::byte& group : groups) group = static_cast<std::byte>(random() % 3);
+  const std::vector<std::uint16_t> numbers = numbers_by_group(groups);
+  const std::vector<std::byte> before = mesh.vertices;
+  for (std::size_t v = 0; v < numbers.size(); ++v) {
+    std::memcpy(mesh.vertices.data() + numbers[v] * std::size_t{mesh.layout.stride},
+                before.data() + v * mesh.layout.stride, mesh.layout.stride);
+  }
+  for (std::uint16_t& index : mesh.indices) index = numbers[index];
+  return mesh;
+}
+
+TEST(MeshObject, GroupsOfVerticesCostTwoBitsEachAtMost) {
+  const std::size_t without = expect_restored(sheet(full_layout(), 40)).size();
+  const Mesh mesh = grouped(sheet(full_layout(), 40));
+  const auto object = encode_mesh_object(mesh.vertices, mesh.indices, mesh.layout);
+  ASSERT_TRUE(object);
+  EXPECT_EQ(object->front(), std::byte{2});
+  EXPECT_LE(object->size(), without + mesh.vertices.size() / mesh.layout.stride / 4);
+  const auto back = decode_mesh_object(*object);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->vertices, mesh.vertices);
+  EXPECT_EQ(back->indices, mesh.indices);
+
+  std::vector<std::byte> newer = *object;
+  newer[0] = std::byte{3};
+  const auto refused = decode_mesh_object(newer);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, "mesh.version");
+  for (const std::byte older : {std::byte{0}, std::byte{1}}) {
+    newer[0] = older;
+    EXPECT_FALSE(decode_mesh_object(newer)) << "version 1 has no groups";
+  }
+  for (std::size_t size = without; size < object->size(); ++size) {
+    const auto cut = decode_mesh_object(std::span(*object).first(size));
+    EXPECT_TRUE(!cut || cut->vertices.size() == mesh.vertices.size());
+  }
+}
+
 TEST(MeshObject, OcclusionTravelsAsAnAttribute) {
   Mesh mesh = sheet(full_layout(), 40);
   const std::size_t without = expect_restored(mesh).size();

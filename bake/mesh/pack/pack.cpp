@@ -45,6 +45,7 @@ struct PackedChunk {
   std::vector<std::byte> vertices;                 ///< in their final order
   std::vector<std::vector<std::uint16_t>> levels;  ///< indices, the finest first
   std::vector<double> level_errors;
+  std::vector<std::uint32_t> level_vertices;  ///< how many of them a level needs
   std::size_t collapsed = 0;  ///< triangles that rounding left without area, and that are left out
   ChunkRecord record{};       ///< lacks first_level
   PackErrors errors;
@@ -74,8 +75,10 @@ ChunkRecord chunk_record(const Chunk& chunk, const ChunkGrid& grid, const UvRang
 /// Packs one chunk after another, reusing its buffers.
 class ChunkPacker {
  public:
-  ChunkPacker(const TriMesh& mesh, const VertexOffsets& offsets, PositionKind kind)
-      : packer_(mesh, offsets, kind), stride_(offsets.stride) {}
+  ChunkPacker(const TriMesh& mesh, const VertexOffsets& offsets, const PackOptions& options)
+      : packer_(mesh, offsets, options.positions),
+        stride_(offsets.stride),
+        prefixes_(options.prefixes) {}
 
   void pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange& uv,
             std::uint32_t texture_side, PackedChunk& out) {
@@ -87,22 +90,50 @@ class ChunkPacker {
     out.collapsed = (chunk.indices.size() - finest.size()) / 3;
     out.level_errors.push_back(0.0);
     const auto order = orderer_.order(bytes_, stride_, finest);
-    out.vertices.resize(order.size() * stride_);
-    for (std::size_t v = 0; v < order.size(); ++v) {
-      std::memcpy(out.vertices.data() + v * stride_, bytes_.data() + order[v] * stride_, stride_);
-    }
     for (const ChunkLevel& level : chunk.coarser) {
       std::vector<std::uint16_t> coarse = lasting_triangles(level.indices);
       if (coarse.empty()) break;
       for (std::uint16_t& index : coarse) index = orderer_.place(index);
-      level_orderer_.order(coarse, static_cast<std::uint32_t>(order.size()));
       out.levels.push_back(std::move(coarse));
       out.level_errors.push_back(std::max({out.level_errors.back(), level.error, level.shading}));
+    }
+    number_vertices(static_cast<std::uint32_t>(order.size()), out);
+    out.vertices.resize(order.size() * stride_);
+    for (std::size_t v = 0; v < order.size(); ++v) {
+      std::memcpy(out.vertices.data() + numbers_[v] * std::size_t{stride_},
+                  bytes_.data() + order[v] * stride_, stride_);
+    }
+    for (std::size_t level = 1; level < out.levels.size(); ++level) {
+      level_orderer_.order(out.levels[level], out.level_vertices[level]);
     }
     out.record.level_count = static_cast<std::uint32_t>(out.levels.size());
   }
 
  private:
+  /// Where levels use prefixes, vertices of the coarsest level come first, then those that the next
+  /// finer one adds.
+  void number_vertices(std::uint32_t count, PackedChunk& out) {
+    const std::size_t levels = out.levels.size();
+    groups_.assign(count, std::byte{0});
+    out.level_vertices.assign(levels, count);
+    if (prefixes_ && levels > 1) {
+      groups_.assign(count, static_cast<std::byte>(levels - 1));
+      for (std::size_t level = 1; level < levels; ++level) {
+        const auto group = static_cast<std::byte>(levels - 1 - level);
+        for (const std::uint16_t v : out.levels[level]) groups_[v] = group;
+      }
+      for (std::size_t level = 1; level < levels; ++level) {
+        const auto last = static_cast<std::byte>(levels - 1 - level);
+        out.level_vertices[level] = static_cast<std::uint32_t>(std::count_if(
+            groups_.begin(), groups_.end(), [&](std::byte group) { return group <= last; }));
+      }
+    }
+    numbers_ = numbers_by_group(groups_);
+    for (std::vector<std::uint16_t>& level : out.levels) {
+      for (std::uint16_t& index : level) index = numbers_[index];
+    }
+  }
+
   /// Without those of which two corners lie at one place as stored: they have no area.
   [[nodiscard]] std::vector<std::uint16_t> lasting_triangles(
       const std::vector<std::uint16_t>& indices) const {
@@ -133,26 +164,30 @@ class ChunkPacker {
 
   VertexPacker packer_;
   std::uint16_t stride_;
+  bool prefixes_;
   ChunkOrderer orderer_;
   LevelOrderer level_orderer_;
+  std::vector<std::byte> groups_;  ///< of each vertex in the order of orderer_
+  std::vector<std::uint16_t> numbers_;
   std::vector<std::byte> bytes_;
   std::vector<glm::vec3> decoded_;
 };
 
 /// Concatenates chunks. Successive chunks share one range of vertices (one set-up of attributes) as
 /// long as 16-bit indices reach all of it. Their indices of one level are contiguous, so chunks of
-/// equal level can be drawn in one call.
+/// equal level can be drawn in one call. Chunks whose levels use prefixes have a range each.
 class ChunkAppender {
  public:
-  explicit ChunkAppender(PackedMesh& out) : out_(out) {}
+  ChunkAppender(PackedMesh& out, bool prefixes) : out_(out), prefixes_(prefixes) {}
 
   void append(PackedChunk& chunk) {
     const auto vertices = static_cast<std::uint32_t>(chunk.vertices.size() / out_.layout.stride);
-    if (range_size_ + vertices > kMaxChunkVertices) close_range();
+    if (range_size_ + vertices > kMaxChunkVertices || prefixes_) close_range();
     chunk.record.first_level = static_cast<std::uint32_t>(out_.levels.size());
     out_.chunks.push_back(chunk.record);
     for (std::size_t depth = 0; depth < chunk.levels.size(); ++depth) {
       add_level(depth, chunk.level_errors[depth], chunk.levels[depth]);
+      if (prefixes_) out_.levels.back().vertex_count = chunk.level_vertices[depth];
     }
     out_.vertices.insert(out_.vertices.end(), chunk.vertices.begin(), chunk.vertices.end());
     range_size_ += vertices;
@@ -164,7 +199,7 @@ class ChunkAppender {
 
   /// Writes the size of the open range to its levels, and opens the next.
   void close_range() {
-    for (; first_level_ < out_.levels.size(); ++first_level_) {
+    for (; first_level_ < out_.levels.size() && !prefixes_; ++first_level_) {
       out_.levels[first_level_].vertex_count = range_size_;
     }
     range_begin_ = out_.vertices.size();
@@ -209,6 +244,7 @@ class ChunkAppender {
   }
 
   PackedMesh& out_;
+  bool prefixes_;
   std::vector<Depth> coarser_;     // from level 1 on
   std::uint64_t range_begin_ = 0;  // bytes
   std::uint32_t range_size_ = 0;   // vertices
@@ -264,11 +300,11 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
   out.indices.reserve(index_count(chunked) * sizeof(std::uint16_t));
 
   const std::vector<ChunkGrid> grids = make_grids(chunked, options.positions);
-  ChunkAppender appender(out);
+  ChunkAppender appender(out, options.prefixes);
   PackErrors errors;
   std::size_t collapsed = 0;
   const unsigned jobs = std::max(1u, options.jobs);
-  std::vector<ChunkPacker> packers(jobs, ChunkPacker(mesh, offsets, options.positions));
+  std::vector<ChunkPacker> packers(jobs, ChunkPacker(mesh, offsets, options));
   // A wave of chunks at a time, a few for each thread; they are joined in order.
   const std::size_t wave = std::size_t{kWave} * jobs;
   for (std::size_t first = 0; first < chunked.chunks.size(); first += wave) {

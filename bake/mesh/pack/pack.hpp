@@ -31,6 +31,9 @@ struct PackOptions {
   double unit_metres = 0.0;  ///< metres in a source unit; 0: unknown
   PositionKind positions = PositionKind::kHalf;
   unsigned jobs = 1;  ///< threads; the bytes do not depend on it
+  /// Vertices of a chunk's coarser levels come first, so that a renderer that has no room for all
+  /// of them keeps the front ones. A chunk is then a range of vertices of its own.
+  bool prefixes = false;
 };
 
 /// As the bundle has it, without a name and a texture.

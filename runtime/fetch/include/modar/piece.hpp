@@ -28,10 +28,10 @@ struct MeshBytes {
 };
 
 /// Header of a mesh object: Draco encodes the connectivity and what it predicts well, plain bits
-/// the rest. It is followed by `attribute_count` AttributeRecords, the Draco buffer, the fine bits
-/// and the corrections.
+/// the rest. It is followed by `attribute_count` AttributeRecords, the Draco buffer, the fine bits,
+/// the corrections, and in version 2 the group of each vertex, coded by encode_bytes().
 struct MeshObjectHeader {
-  std::uint8_t version;               ///< 1
+  std::uint8_t version;               ///< 1; 2 where vertices are in groups
   std::uint8_t attribute_count;       ///< 1 to 8
   std::uint8_t normal_bits;           ///< of the octahedral map, 2 to 16; 0: no such normals
   std::uint8_t reserved;              ///< 0
