@@ -8,7 +8,7 @@ NAME: a constant, such as kRatio, that is defined as `constexpr TYPE NAME = NUMB
 each; default 0.5 to 2 times the present one. --jobs: benches at a time (default: a processor each); one alone measures
 times well. BENCH: of `modar-lab bench`, with its options; its inputs are read by each run, so that all values see the same frames.
 A figure of several rows ("right_pct near", "right_pct far") is their mean, one beside another program's ("rms_percent/meshopt_simplify")
-the mean ratio. The present value is marked by a star.
+the geometric mean of the ratios. The present value is marked by a star.
 Builds a copy of the tree, in which the constants are variables, in build/tune (minutes the first time, then the files that use it)."""
 import argparse
 import concurrent.futures
@@ -16,6 +16,7 @@ import json
 import os
 import pathlib
 import re
+import statistics
 import subprocess
 import sys
 
@@ -106,7 +107,7 @@ def figures(name, value, bench):
         figure = row["ratio" if "/" in measure else "ours"]
         if figure is not None:
             rows.setdefault(measure, []).append(figure)
-    return {measure: sum(all_rows) / len(all_rows) for measure, all_rows in rows.items()}
+    return {measure: (statistics.geometric_mean if "/" in measure and min(found) > 0 else statistics.mean)(found) for measure, found in rows.items()}
 
 
 def present(match):

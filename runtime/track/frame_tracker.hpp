@@ -9,8 +9,9 @@
 
 namespace modar::tracker {
 
-/// Frames for which a lost pattern is searched for first, and in every frame: two seconds. Trades
-/// the time of those searches for how fast a pattern comes back; set by hand.
+/// Frames for which a lost pattern is searched for first, and in every frame: two seconds, in which
+/// a hand that was in the way is gone. Trades the time of those searches for how fast a pattern
+/// comes back.
 inline constexpr int kRecentFrames = 60;
 
 /// What is known of a pattern from frame to frame.

@@ -184,7 +184,9 @@ bool inside(const PatchPlace& place, const GrayImage& image) {
 PatchNormalEquations equations_of(const Patch& p, const PatchSums& s, float tukey) {
   // Squared gray values. Below kFlat a template shows nothing, and the frame nothing below a
   // quarter of it, for darker exposures. kNoise keeps the weight 1 / variance of plain patches
-  // finite: from there down it is noise that decides what a patch is worth. Both set by hand.
+  // finite: from there down it is noise that decides what a patch is worth. Swept on area
+  // 0.02-0.05: 56.7 % right with 1 to 16 and with 15 to 60; corners are 0.100, 0.096 and 0.093
+  // pixels off with 15, 30 and 60 for the second.
   constexpr float kFlat = 4.0f;
   constexpr float kNoise = 30.0f;
   PatchNormalEquations out;
@@ -217,7 +219,8 @@ bool observe_patch_at(const Patch& patch, const PatchPlace& place, const GrayIma
 }
 
 glm::vec2 displacement(const PatchNormalEquations& equations) {
-  // A tenth of the trace: along an edge the displacement shrinks, across it by a tenth. By hand.
+  // A tenth of the trace: along an edge the displacement shrinks, across it by a tenth. Swept
+  // on area 0.02-0.05: flat from 0.03 to 0.3.
   const float damping = 0.1f * (equations.xx + equations.yy);
   const float xx = equations.xx + damping;
   const float yy = equations.yy + damping;
@@ -380,8 +383,8 @@ constexpr double kPreciselyConverged = 0.045;
 // Patches for the steps before the last ones, which only have to come near. A study measured the
 // price of 40 patches in all steps: an error of 0.050 px instead of 0.040, at 7/8 of the time.
 constexpr std::size_t kCoarsePatches = 40;
-// Steps over all patches; a converged pose ends earlier. Bounds the time of one that does not; set
-// by hand.
+// Steps over all patches; a converged pose ends earlier. Bounds the time of one that does not.
+// Swept on tracking fast: corners are 0.59, 0.59 and 0.58 pixels off with 5, 10 and 20.
 constexpr int kPreciseSteps = 10;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;

@@ -322,7 +322,7 @@ Pose extrapolate(const Pose& previous, const Pose& now) {
 
 bool in_view(const TrackedPattern& pattern, const PlaneMap& map, const Camera& camera) {
   constexpr int kSide = 5;
-  constexpr int kMinInside = 4;  // of 25: names the reason of a loss only; set by hand
+  constexpr int kMinInside = 4;  // of 25: names the reason of a loss only
   int inside = 0;
   for (int i = 0; i < kSide * kSide; ++i) {
     bool in_front = false;

@@ -22,7 +22,9 @@ int photometric_percent(const TrackedPattern& pattern, const FrameView& frame, c
 
 int map_photometric_percent(const TrackedPattern& pattern, const FrameView& frame,
                             const PlaneMap& map) {
-  // A map has two parameters more than a pose to bend to what it sees; set by hand.
+  // A map has two parameters more than a pose to bend to what it sees. Swept on 70 % covered: with
+  // 25, 50 and 75, 93.3, 90.8 and 90.8 % of the frames are recognised, and 86.7, 89.2 and 89.2 %
+  // right.
   constexpr int kMinMapPercent = 50;
   const PhotometricCheck check = check_photometry(pattern, map, frame.pyramid);
   if (check.matching < 2 * kMinCells) return 0;
@@ -35,14 +37,15 @@ int map_photometric_percent(const TrackedPattern& pattern, const FrameView& fram
 namespace {
 
 // Side of the pattern on the coarsest level that refinement starts on, pixels: smaller images hold
-// no patches. By hand.
+// no patches. Swept on area 0.02-0.05: flat from 12 to 48.
 constexpr double kMinSide = 24.0;
-// Ratio of distances between frames; larger changes are patches that slid to other texture. By
-// hand.
+// Ratio of distances between frames; larger changes are patches that slid to other texture. Swept
+// on tracking fast: flat from 1.15 to 1.7.
 constexpr double kMaxZoom = 1.35;
 // Share of a coarser level's inlier ratio that a finer one must keep: under blur its patches fit
-// along the motion only, and draw the pose away from what coarse ones found. By hand, on blurred
-// paths of `modar-lab bench pose`.
+// along the motion only, and draw the pose away from what coarse ones found. Swept on tracking
+// fast: corners are 0.56, 0.59 and 0.66 pixels off with 0.6, 0.85 and 0.95, and jump by 0.57, 0.57
+// and 0.47.
 constexpr double kMinKept = 0.85;
 // Gauss-Newton steps of a level for a pose, and for a map.
 constexpr int kSteps = 10;
@@ -150,8 +153,9 @@ constexpr int kPointSteps = 4;     // over features alone
 constexpr int kLevelSteps = 5;     // of a level: each lets patches further away take part
 // Template pixels to which the pose must predict a patch for it to take part, and to which a patch
 // that correlates by kMinCorrelation then measures its place. Larger predictions let patches in
-// that settle on a neighbouring edge. The three set by hand on half-covered patterns, which went
-// from 98.3 to 100 % right.
+// that settle on a neighbouring edge. Half-covered patterns went from 98.3 to 100 % right by these.
+// Swept on 70 % covered, 89.2 % right now: 88.3 and 89.2 % with half and twice the first, 88.3 and
+// 87.5 % of the second; 88.3 % with 0.3 and 0.8 for the third.
 constexpr double kMaxUncertainty = 1.2;
 constexpr double kPatchSigma = 0.4;
 constexpr float kMinCorrelation = 0.6f;

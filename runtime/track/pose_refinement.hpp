@@ -18,7 +18,8 @@ inline constexpr int kMinPercent = 30;
 /// The same of a place that kVouching features agree with: half-covered patterns went from 95.0 to
 /// 98.8 % right with that and what PatchFit::good() makes of it.
 inline constexpr int kVouchedPercent = 20;
-/// And in how many cells at least: a few smooth ones look alike anywhere. Set by hand.
+/// And in how many cells at least: a few smooth ones look alike anywhere. Swept on 70 % covered:
+/// 89.2 % right with 4 and 8, 82.5 % with 16.
 inline constexpr int kMinCells = 8;
 
 /// Percentage of the textured cells in view that correlate; 0 if fewer do than `min_cells`.

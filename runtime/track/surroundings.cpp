@@ -22,16 +22,19 @@ constexpr int kMaxWidth = 400;
 // pixels away, which are 12 there.
 constexpr int kCoarser = 2;
 // Cells of a frame, each with one point at most: more points cost time, fewer are lost behind a
-// hand. Of the cells some are looked at in each frame, all in half a second. By hand.
+// hand. Of the cells some are looked at in each frame, all in half a second. Swept on rooms: 0.78,
+// 0.16 and 0.16 % with 3, 6 and 12 a frame.
 constexpr int kColumns = 10;
 constexpr int kRows = 8;
 constexpr int kCellsAFrame = 6;
 // A point is dropped after so many misses in a row: soon while it is new, late once it is steady,
-// since a passer-by may hide it for seconds. By hand.
+// since a passer-by may hide it for seconds. Swept on rooms: flat from 4 to 16, and at twice the
+// second.
 constexpr int kMissesOfNew = 8;
 constexpr int kMissesOfSteady = 90;
-// Hits, and inverse depths over their standard deviation, from which a point is steady. By hand:
-// without the second, a still camera's surroundings are followed.
+// Hits, and inverse depths over their standard deviation, from which a point is steady: without the
+// second, a still camera's surroundings are followed. Swept on rooms: 0.14, 0.16 and 0.88 % with 4,
+// 8 and 16, and 0.16 and 0.17 % with 5 and 10.
 constexpr int kSteadyHits = 8;
 constexpr double kSteadyDepth = 5.0;
 // Pixels of the level that it must have gone, and been seen where the pattern's motion has it: well
@@ -41,37 +44,45 @@ constexpr double kSteadyTravel = 5.0;
 // depths, and soon none of the older points.
 constexpr int kUsableHits = 3;
 // Steady points that must be seen, to begin and to go on: three determine a pose. And the frames
-// without that are bridged by the last motion. By hand.
+// without that are bridged by the last motion. Swept on rooms: flat at twice either.
 constexpr int kLeastPoints = 8;
 constexpr int kBridged = 10;
 // What covers the pattern and stands still for a while has points as well, and goes away with
 // them: the weight of points learned without the pattern (of 0.03 to 1, the best on two rooms), and
 // the others that must be seen in each half of the frame, left, right, upper and lower, for that:
-// those of one side alone tell a pose badly. By hand.
+// those of one side alone tell a pose badly. Swept on rooms: 0.17, 0.16 and 0.16 % with 2, 5
+// and 10.
 constexpr double kNewWeight = 0.3;
 constexpr int kEnoughSteady = 5;
 // And someone who fills the frame hides all others for a while, and would turn the world with him:
 // of the points that were learned from the pattern, or seen for a second, a share must be where
-// they should be, if so many are in view. By hand.
+// they should be, if so many are in view. Swept on rooms: flat at twice the first two; 46, 46 and
+// 34 % of the frames are followed with shares of 0.17, 0.35 and 0.7, 0.22, 0.22 and 0.13 degrees
+// off.
 constexpr int kKnownHits = 30;
 constexpr int kLeastKnown = 8;
 constexpr double kKnownShare = 0.35;
-// Information of a patch's equations as they stand, 1 / square pixels. By hand; see kHonest.
+// Information of a patch's equations as they stand, 1 / square pixels; see kHonest. Swept on rooms:
+// 0.19, 0.16 and 0.17 % with 0.5, 1 and 2.
 constexpr double kInformation = 1.0;
 // What one frame adds to a depth, of that: frames in a row see the same template with the same
-// error. And the accuracy in pixels that no baseline exceeds. By hand.
+// error. And the accuracy in pixels that no baseline exceeds. Swept on rooms: 0.20, 0.16 and 0.17 %
+// with half, once and twice the first, and 0.17, 0.16 and 0.17 % of the second.
 constexpr double kDepthGain = 0.125;
 constexpr double kDepthAccuracy = 0.15;
 // Pixels of the level by which a point may be seen beside its place: the pattern's own pose is off
-// by half of it at the frame's far side. By hand.
+// by half of it at the frame's far side. Swept on rooms: 0.15, 0.16 and 0.17 % with 0.75, 1.5
+// and 3.
 constexpr double kMaxOffset = 1.5;
 // Standard deviations are stated so many times larger than the equations say, which take errors of
 // depths and anchors for independent: of `modar-lab bench extended` 95 % lie within two of these
 // then.
 constexpr double kHonest = 4.0;
 // Standard deviations of a gyroscope's turn: radians a frame, somewhat more than `modar-lab bench
-// extended` adds, and the share of the whole turn by which its scale may be off. By hand: larger
-// ones leave more to the points.
+// extended` adds, and the share of the whole turn by which its scale may be off. Larger ones leave
+// more to the points. Swept on the turned room with a gyroscope: 0.16, 0.18 and 0.24 % and 0.087,
+// 0.075 and 0.073 degrees off with half, once and twice the first, 0.17, 0.18 and 0.21 % and 0.076,
+// 0.075 and 0.065 degrees of the second.
 constexpr double kTurnSigma = 0.0005;
 constexpr double kTurnScale = 0.01;
 
@@ -204,7 +215,9 @@ glm::dvec2 rest_of(const MapPointEquations& one, const Vector6& change) {
 
 /// Tukey's weight by that rest: a point that moved by itself asks for another place.
 double robust_weight(const MapPointEquations& one, const Vector6& change) {
-  constexpr double kFar = 1.5;  // template pixels, beyond what noise does; by hand
+  // Template pixels, beyond what noise does. Swept on rooms: 0.15, 0.16 and 0.17 % with 0.75, 1.5
+  // and 3.
+  constexpr double kFar = 1.5;
   const glm::dvec2 rest = rest_of(one, change);
   const double far = std::min(1.0, glm::dot(rest, rest) / (kFar * kFar));
   return (1.0 - far) * (1.0 - far);
@@ -462,8 +475,10 @@ ExpectedRotation Surroundings::expected_rotation() const {
 bool Surroundings::align_fine(const FrameView& frame, Pose& pose, ExtendedPose& out) {
   constexpr int kFineSteps = 8;
   constexpr double kConverged = 0.03;
-  constexpr double kLeastShare = 0.35;  // of the points in view, of which others hide some; by hand
-  constexpr double kPlaced = 0.8;       // template pixels that a point in its place still asks for
+  // Of the points in view, of which others hide some. Swept on rooms: 46, 46 and 34 % followed with
+  // 0.17, 0.35 and 0.7.
+  constexpr double kLeastShare = 0.35;
+  constexpr double kPlaced = 0.8;  // template pixels that a point in its place still asks for
   const ExpectedRotation expected = expected_rotation();
   const double new_weight = enough_of_pattern() ? kNewWeight : 1.0;
   PoseSystem system;

@@ -18,10 +18,12 @@ struct TrackerRecordOptions {
   /// codes 89 % right at area 0.1-0.25 in 9 ms, 1,500 on 4,000 codes 94 % in 12 ms.
   std::uint32_t features = 3000;
   /// Random renderings that decide which descriptors are kept. More make a better choice and a
-  /// slower bake. Set by hand.
+  /// slower bake: of prints on 2 to 5 % of the frame, 53.3, 56.7 and 57.5 % of the poses are right
+  /// with 60, 120 and 240.
   std::uint32_t trial_views = 120;
   /// Tracked patches of each halving of the picture, at most: a frame uses a few dozen of them, the
-  /// rest stand by where those are covered. Set by hand.
+  /// rest stand by where those are covered. The most that a record holds: 70 % covered, 89.2 % of
+  /// the poses are right with them, 72.5 % with half.
   std::uint32_t patches_per_level = 256;
   bool score = true;  ///< the bake scores the picture, too
   unsigned jobs = 1;  ///< threads; the bytes do not depend on it
