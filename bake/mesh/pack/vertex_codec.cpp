@@ -172,10 +172,6 @@ namespace {
 
 constexpr std::uint16_t kMinusZero = 0x8000;
 constexpr double kDegrees = 57.29577951308232;
-/// Vertices that are packed before their errors are measured: in loops of their own, more vertices
-/// are under way in the processor at once. Set by hand.
-constexpr std::size_t kPackedTogether = 64;
-
 /// snorm8_to_float() of each code + 128: a table saves three divisions a normal.
 constexpr std::array<double, 256> make_snorm8_values() {
   std::array<double, 256> values{};
@@ -278,31 +274,23 @@ void VertexPacker::pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange
                         std::vector<glm::vec3>& decoded) {
   errors_ = PackErrors();
   decoded.resize(chunk.vertices.size());
-  std::array<glm::dvec3, kPackedTogether> normals;
-  const std::span<const std::uint32_t> vertices(chunk.vertices);
-  for (std::size_t first = 0; first < vertices.size(); first += kPackedTogether) {
-    const auto some = vertices.subspan(first, std::min(kPackedTogether, vertices.size() - first));
-    for (std::size_t i = 0; i < some.size(); ++i, bytes += offsets_.stride) {
-      const std::uint32_t v = some[i];
-      const glm::dvec3& p = mesh_.positions[v];
-      const glm::dvec3 n(mesh_.normals[v]);
-      glm::vec3& at = decoded[first + i];
-      if (kind_ == PositionKind::kInt16) {
-        at = put_int16(p, grid, bytes);
-      } else {
-        at = kind_ == PositionKind::kHalf ? put_half(p, bytes) : put_float(p, bytes);
-      }
-      std::byte* const normal = bytes + offsets_.normal;
-      normals[i] = offsets_.normal_components == 2 ? put_oct(n, normal) : put_normal(n, normal);
-      if (offsets_.uv != 0) put_uv(mesh_.uvs[v], uv, texture_side, bytes + offsets_.uv);
-      if (offsets_.occlusion != 0) bytes[offsets_.occlusion] = std::byte{mesh_.occlusion[v]};
-      if (offsets_.colour != 0) std::memcpy(bytes + offsets_.colour, &mesh_.colours[v], 4);
+  for (std::size_t i = 0; i < chunk.vertices.size(); ++i, bytes += offsets_.stride) {
+    const std::uint32_t v = chunk.vertices[i];
+    const glm::dvec3& p = mesh_.positions[v];
+    const glm::dvec3 n(mesh_.normals[v]);
+    glm::vec3& at = decoded[i];
+    if (kind_ == PositionKind::kInt16) {
+      at = put_int16(p, grid, bytes);
+    } else {
+      at = kind_ == PositionKind::kHalf ? put_half(p, bytes) : put_float(p, bytes);
     }
-    for (std::size_t i = 0; i < some.size(); ++i) {
-      const glm::dvec3 at(decoded[first + i]);
-      errors_.position.add(glm::length(at - mesh_.positions[some[i]]));
-      add_normal_error(normals[i], glm::dvec3(mesh_.normals[some[i]]));
-    }
+    errors_.position.add(glm::length(glm::dvec3(at) - p));
+    std::byte* const normal = bytes + offsets_.normal;
+    add_normal_error(offsets_.normal_components == 2 ? put_oct(n, normal) : put_normal(n, normal),
+                     n);
+    if (offsets_.uv != 0) put_uv(mesh_.uvs[v], uv, texture_side, bytes + offsets_.uv);
+    if (offsets_.occlusion != 0) bytes[offsets_.occlusion] = std::byte{mesh_.occlusion[v]};
+    if (offsets_.colour != 0) std::memcpy(bytes + offsets_.colour, &mesh_.colours[v], 4);
   }
 }
 
