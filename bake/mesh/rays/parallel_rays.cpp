@@ -15,8 +15,9 @@ constexpr float kCellsAPoint = 1.0f;
 constexpr float kMostRows = 2047;  // more of a side are no faster
 constexpr float kOutside = 1e9f;
 constexpr float kRowSlack = 1e-2f;  // cells; more than places in single precision are off by
-/// Triangles over at most so many rows are not clipped to each. By hand.
-constexpr std::uint32_t kFewRows = 3;
+/// Triangles over at most so many rows are not clipped to each. Of a bust of 70,000 triangles the
+/// bake without levels takes 1.09 times as long with 3, and as long with 10 and 16.
+constexpr std::uint32_t kFewRows = 6;
 constexpr float kLeastWidth = 1e-3f;  // of a grid, as points in a line have none
 
 }  // namespace
