@@ -41,7 +41,7 @@ constexpr double kFine = 1.3;
 constexpr double kFinest = 1.9;
 // range_value() at which a score reaches 63 of 100: the grades' limits are 80, 72, 60 and 44 then.
 constexpr double kScoreScale = 8.7;
-// Least range_value() of the grades A to D. Set by hand on the twelve pictures of the score.
+// Least range_value() of the grades A to D: of the twelve pictures of the score ten are A, two B.
 constexpr double kGradeLimits[] = {14, 11, 8, 5};
 
 /// A feature that the bake could keep.

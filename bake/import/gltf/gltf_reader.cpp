@@ -32,7 +32,7 @@ namespace {
 /// Vertices beyond which a file may not copy nodes: some bytes could ask for any number. 33 times
 /// the triangles that the device draws in a frame.
 constexpr std::size_t kMostCopied = std::size_t{1} << 25;
-constexpr int kMaxDepth = 1000;  ///< of nodes; keeps recursion within a small stack, set by hand
+constexpr int kMaxDepth = 1000;  ///< of nodes, which take 0.5 to 0.75 MiB of the stack
 
 /// What is counted while the scene is read, and left out of the model.
 struct LeftOut {

@@ -19,11 +19,11 @@ namespace {
 
 /// Coarse triangles that the line of one edge goes through: a few from either end, else many. A
 /// long way from one end is mostly one around something, but where hundreds of triangles meet in
-/// one vertex there is no other. Set by hand: a sixteenth of the triangles is seldom five.
+/// one vertex there is no other. Swept on scans: flat from 6 to 24 for the few.
 constexpr std::uint8_t kFewCrossed = 12;
 constexpr std::uint8_t kMostCrossed = 60;
-/// Coarse triangles that are looked at for a way where no plane leads along one. Set by hand: with
-/// it, 30 of 4,900 such edges of a rough grid of 1.4 million triangles are left.
+/// Coarse triangles that are looked at for a way where no plane leads along one: 30 of 4,900 such
+/// edges of a rough grid of 1.4 million triangles are left. Swept on scans: flat from 25 to 400.
 constexpr std::size_t kMostSearched = 100;
 constexpr std::uint8_t kUntraced = 0xFF;
 constexpr std::uint16_t kNoVertex = 0xFFFF;

@@ -62,7 +62,7 @@ class PixelCells {
   std::vector<Place> places_;
   std::vector<LookDifference> weighed_;  ///< by area, in the order of places_
   /// Halvings to the last answer's cells, where the next search begins: the levels of one surface
-  /// come one after another. The first is set by hand: five scans have 3 to 6.
+  /// come one after another. The first begins where five scans end, 3 to 6.
   unsigned bits_ = 5;
 };
 

@@ -50,9 +50,11 @@ struct Stretch {
 };
 
 /// A piece estimated to exceed the limit by this factor is split without counting its vertices: a
-/// wrong estimate would make chunks small. Set by hand.
+/// wrong estimate would make chunks small. Grids of 0.9 and 1.3 million
+/// triangles have 29 and 42 chunks with 1.1 to 1.6.
 constexpr double kSurely = 1.25;
-/// What borders add to the vertices of a piece, and a margin for uneven halves. Set by hand.
+/// What borders add to the vertices of a piece, and a margin for uneven halves. The same grids have
+/// 35, 29 and 32, and 56, 42 and 45 chunks with 1, 1.055 and 1.15.
 constexpr double kMargin = 1.055;
 
 /// Marks that are looked at together, and what they are where all are set.

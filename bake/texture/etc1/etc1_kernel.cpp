@@ -89,8 +89,9 @@ HWY_NOINLINE void quick_mode(const Etc1Search& search, HalfSite (&site)[2], Choi
 }
 
 /// Black beside white in any mixture: base colours of middle brightness with the largest table
-/// reach both by clamping, which no estimate sees. Tries them where a half's brightness
-/// spans more than 200 of 255: less tries more blocks in vain, more misses some. Set by hand.
+/// reach both by clamping, which no estimate sees. Tries them where a half's brightness spans more
+/// than 200 of 255. Black and white drawings (`modar-lab bench etc1`, `fast`): exact from 100 to
+/// 200, 28 to 38 dB without; with a noise of 8 added 44.2 and 38.7 dB. Photos are the same without.
 template <class W>
 HWY_NOINLINE void try_extremes(const Etc1Search& search, const HalfSite (&site)[2],
                                Choice& choice) {
