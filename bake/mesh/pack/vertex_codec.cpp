@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <span>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
