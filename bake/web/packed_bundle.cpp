@@ -22,6 +22,10 @@ constexpr std::uint64_t kMostRaw = 256 << 10;
 /// more than that. What follows in the order of need travels as it is.
 constexpr std::uint64_t kMostCoded = 4 << 20;
 
+/// Of a piece that ends where a level's vertices or indices do, at least: the recipe has 64 bytes a
+/// piece and comes first, and what is brought beside a level is not needed yet. Set by hand.
+constexpr std::uint64_t kLeastCut = 8 << 10;
+
 struct Piece {
   PieceRecord record{};
   std::vector<std::byte> stored;
@@ -29,7 +33,7 @@ struct Piece {
 
 class Packer {
  public:
-  explicit Packer(const BundleView& bundle) : bundle_(bundle) {}
+  explicit Packer(const BundleView& bundle) : bundle_(bundle) { find_level_ends(); }
 
   std::vector<std::byte> pack() {
     for (const StageRange& range : stage_ranges(bundle_)) {
@@ -81,11 +85,38 @@ class Packer {
     return true;
   }
 
+  /// Levels that come by ranges: see Renderer::Part::kWanted.
+  void find_level_ends() {
+    const auto start = [&](std::span<const std::byte> section) {
+      return static_cast<std::uint64_t>(section.data() - bundle_.bytes().data());
+    };
+    for (std::uint32_t g = 0; g < bundle_.chunk_groups(); ++g) {
+      const ChunkGroup group = bundle_.chunk_group(g);
+      const std::uint64_t stride = bundle_.layouts()[bundle_.models()[group.model].layout].stride;
+      for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+        const ChunkRecord& chunk = bundle_.chunks()[group.first_chunk + c];
+        for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
+          const LevelRecord& level = bundle_.levels()[chunk.first_level + l];
+          ends_.push_back(start(bundle_.vertices()) + level.vertex_offset +
+                          level.vertex_count * stride);
+          ends_.push_back(start(bundle_.indices()) + level.index_offset + 2ull * level.index_count);
+        }
+      }
+    }
+    std::sort(ends_.begin(), ends_.end());
+  }
+
+  /// Of `size` bytes, those up to the end of a level, if one ends there.
+  [[nodiscard]] std::uint64_t cut(std::uint64_t offset, std::uint64_t size) const {
+    const auto end = std::lower_bound(ends_.begin(), ends_.end(), offset + kLeastCut);
+    return end == ends_.end() ? size : std::min(size, *end - offset);
+  }
+
   void add_bytes(const StageRange& range) {
     const std::uint64_t most = kMostRaw / range.stride * range.stride;
-    for (std::uint64_t at = 0; at < range.size; at += most) {
-      const std::uint64_t size = std::min(most, range.size - at);
-      const auto raw = bundle_.bytes().subspan(range.offset + at, size);
+    for (std::uint64_t at = 0, size = 0; at < range.size; at += size) {
+      size = std::min(most, range.size - at);
+      auto raw = bundle_.bytes().subspan(range.offset + at, size);
       if (coded_ + size <= kMostCoded) {
         coded_ += size;
         auto coded = encode_bytes(raw, range.stride);
@@ -94,11 +125,14 @@ class Packer {
           continue;
         }
       }
+      size = cut(range.offset + at, size);
+      raw = raw.first(size);
       add(range, range.offset + at, size, PieceForm::kStored, {raw.begin(), raw.end()});
     }
   }
 
   const BundleView& bundle_;
+  std::vector<std::uint64_t> ends_;  ///< of levels' vertices and indices, in the file
   std::vector<Piece> pieces_;
   std::uint64_t coded_ = 0;
 };

@@ -216,14 +216,20 @@ void DrawList::add_there(const Request& request, std::uint32_t item,
   culled_ += culled;
 }
 
-/// Brings the commands from `first` on to levels that are there; false if a chunk has none.
+/// Brings the commands from `first` on to levels that are there, finer ones where one is: an eye
+/// that moves away sees no worse meanwhile. False if a chunk has none.
 bool DrawList::use_there(const BundleView& bundle, std::size_t first,
                          const GeometryStore& geometry) {
   for (std::size_t i = first; i < commands_.size(); ++i) {
     DrawCommand& command = commands_[i];
     const ChunkRecord& chunk = bundle.chunks()[command.chunk];
-    while (!geometry.there({&command.level, 1})) {
-      if (++command.level == chunk.first_level + chunk.level_count) return false;
+    const std::uint32_t end = chunk.first_level + chunk.level_count;
+    const std::uint32_t chosen = command.level;
+    const auto missing = [&] { return !geometry.there({&command.level, 1}); };
+    while (missing() && command.level > chunk.first_level) --command.level;
+    if (missing()) command.level = chosen;
+    while (missing()) {
+      if (++command.level == end) return false;
     }
   }
   return true;

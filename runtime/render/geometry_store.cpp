@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "formats/transport/stages.hpp"
@@ -22,6 +23,8 @@ Result<void> rewritten() {
               "this context reads no half floats, and vertices are rewritten for it",
               "keep the whole bundle in memory");
 }
+
+constexpr GLenum kCopyReadBuffer = 0x8F36;  ///< of ES 3, which gl2.h does not name
 
 GLuint make_buffer(GLenum target) {
   GLuint buffer = 0;
@@ -76,35 +79,33 @@ void GeometryStore::collect_ranges() {
   merge_vertex_ranges();
 }
 
+/// One range a distinct start and size: a coarser level may use the first vertices of a finer one.
 void GeometryStore::merge_vertex_ranges() {
-  // One range a distinct start; the longest level that starts there decides its size.
   std::vector<std::uint32_t> order(vertex_ranges_.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   const auto before = [&](std::uint32_t a, std::uint32_t b) {
     const Range& left = vertex_ranges_[a];
     const Range& right = vertex_ranges_[b];
-    if (left.layout != right.layout) return left.layout < right.layout;
-    return left.source != right.source ? left.source < right.source : a < b;
+    return std::tie(left.layout, left.source, left.size) <
+           std::tie(right.layout, right.source, right.size);
   };
   // Once a bundle: std::sort() is four times as long.
   std::make_heap(order.begin(), order.end(), before);
   std::sort_heap(order.begin(), order.end(), before);
   std::vector<Range> merged;
-  for (const std::uint32_t level : order) {
-    const Range& range = vertex_ranges_[level];
-    if (merged.empty() || merged.back().source != range.source ||
-        merged.back().layout != range.layout) {
-      merged.push_back(range);
-    }
-    merged.back().size = std::max(merged.back().size, range.size);
-    level_vertices_[level] = static_cast<std::uint32_t>(merged.size() - 1);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    if (i == 0 || before(order[i - 1], order[i])) merged.push_back(vertex_ranges_[order[i]]);
+    level_vertices_[order[i]] = static_cast<std::uint32_t>(merged.size() - 1);
   }
-  for (Range& range : merged) {
+  // From the end: of those that begin alike, the largest holds the others where all are uploaded.
+  for (std::size_t i = merged.size(); i-- > 0;) {
+    Range& range = merged[i];
     if (range.layout == kNone) continue;
     const VertexFormat& format = formats_[range.layout];
     range.gpu_size = range.size / format.source_stride * format.stride;
-    range.gpu_offset = rewrites_ ? vertex_total_ : range.source;
-    vertex_total_ += range.gpu_size;
+    const bool held = i + 1 < merged.size() && begin_alike(range, merged[i + 1]);
+    range.gpu_offset = held ? merged[i + 1].gpu_offset : rewrites_ ? vertex_total_ : range.source;
+    if (!held) vertex_total_ += range.gpu_size;
   }
   vertex_ranges_ = std::move(merged);
   counted_.assign(vertex_ranges_.size(), 0);
@@ -168,9 +169,10 @@ Result<void> GeometryStore::expect() {
 
 Result<void> GeometryStore::expect_wanted() {
   if (rewrites_) return rewritten();
+  copy_buffer_ = look_up_copy_buffer();
   streams_ = true;
-  // A level that is drawn until a finer one of the same chunks has come has half its triangles at
-  // most, and shares its vertices: both fit.
+  // A level that is drawn until a finer one of the same chunks has come has half its triangles and
+  // some of its vertices at most: both fit.
   list_budget_ = budget_ / 3 * 2;
   find_kept(false);
   find_kept(true);
@@ -219,12 +221,32 @@ std::uint32_t GeometryStore::open_wanted(GlState& gl, bool& indices, std::uint64
     glBufferData(target, static_cast<GLsizeiptr>(next.size), nullptr, GL_STATIC_DRAW);
     next.last_used = kOpen;
     resident_bytes_ += next.gpu_size;
+    const std::uint64_t copied = indices ? 0 : copy_front(next);
+    offset = next.source + copied;
+    size = next.size - copied;
+    if (size == 0) {
+      next.last_used = frame_;
+      continue;
+    }
     open_.push_back(number);
-    offset = next.source;
-    size = next.size;
     return number;
   }
   return kNone;
+}
+
+/// Copies to an open range, whose buffer is bound, what others have that begin alike; answers how
+/// many bytes.
+std::uint64_t GeometryStore::copy_front(const Range& to) const {
+  const Range* from = nullptr;
+  for (const Range& range : vertex_ranges_) {
+    if (range.buffer == 0 || range.last_used == kOpen || !begin_alike(range, to)) continue;
+    if (from == nullptr || range.size > from->size) from = &range;
+  }
+  if (from == nullptr || copy_buffer_ == nullptr) return 0;
+  const std::uint64_t bytes = std::min(from->size, to.size);
+  glBindBuffer(kCopyReadBuffer, from->buffer);
+  copy_buffer_(kCopyReadBuffer, GL_ARRAY_BUFFER, 0, 0, static_cast<GLsizeiptr>(bytes));
+  return bytes;
 }
 
 void GeometryStore::have(std::uint32_t number) {

@@ -78,8 +78,7 @@ class GeometryStore {
   [[nodiscard]] std::uint64_t evictions() const { return evictions_; }
 
  private:
-  /// Bytes of the bundle that are uploaded together. Levels that start at the same vertex share
-  /// one.
+  /// Bytes of the bundle that are uploaded together. Levels that use the same vertices share one.
   struct Range {
     std::uint64_t source = 0;  ///< bytes from the start of the section
     std::uint64_t size = 0;    ///< bytes in the section
@@ -102,6 +101,10 @@ class GeometryStore {
   [[nodiscard]] static bool there(const Range& range) {
     return range.kept || (range.buffer != 0 && range.last_used != kOpen);
   }
+  [[nodiscard]] static bool begin_alike(const Range& a, const Range& b) {
+    return a.source == b.source && a.layout == b.layout;
+  }
+  [[nodiscard]] std::uint64_t copy_front(const Range& to) const;
   void find_kept(bool indices);
   void put_open(bool indices, std::uint64_t offset, std::span<const std::byte> bytes);
   void collect_ranges();
@@ -122,6 +125,7 @@ class GeometryStore {
   std::vector<std::byte> scratch_;     ///< rewritten vertices on their way
   std::vector<std::uint32_t> wanted_;  ///< ranges, the next one last
   std::vector<std::uint32_t> open_;    ///< ranges
+  CopyBuffer copy_buffer_ = nullptr;
   std::uint64_t budget_ = 0;
   std::uint64_t list_budget_ = 0;  ///< of fits()
   std::uint64_t vertex_total_ = 0;

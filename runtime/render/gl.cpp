@@ -158,6 +158,10 @@ std::string_view text_of(GLenum name) {
 
 }  // namespace
 
+CopyBuffer look_up_copy_buffer() {
+  return reinterpret_cast<CopyBuffer>(eglGetProcAddress("glCopyBufferSubData"));
+}
+
 GlExtensions load_gl_extensions(const GlCaps& caps) {
   GlExtensions found;
   const std::string_view list = text_of(GL_EXTENSIONS);

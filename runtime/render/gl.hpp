@@ -42,6 +42,12 @@ struct GlExtensions {
   }
 };
 
+/// Of ES 3: glCopyBufferSubData(); null where there is none. Apart from GlExtensions, so that
+/// programs of whole bundles do not link it.
+using CopyBuffer = void(GL_APIENTRYP)(GLenum from, GLenum to, GLintptr from_offset,
+                                      GLintptr to_offset, GLsizeiptr size);
+CopyBuffer look_up_copy_buffer();
+
 /// caps: masked ones; what they lack is not looked up.
 GlExtensions load_gl_extensions(const GlCaps& caps);
 

@@ -205,12 +205,15 @@ typedef void (*web_function)(void);
 void glDrawElementsInstanced(GLenum mode, GLsizei count, GLenum type, const void* indices,
                              GLsizei instances);
 void glVertexAttribDivisor(GLuint index, GLuint divisor);
+void glCopyBufferSubData(GLenum from, GLenum to, GLintptr from_offset, GLintptr to_offset,
+                         GLsizeiptr size);
 web_function eglGetProcAddress(const char* name) {
   const auto is = [name](const char* other) {
     return std::strncmp(name, other, std::strlen(other)) == 0;
   };
   if (is("glDrawElementsInstanced")) return reinterpret_cast<web_function>(glDrawElementsInstanced);
   if (is("glVertexAttribDivisor")) return reinterpret_cast<web_function>(glVertexAttribDivisor);
+  if (is("glCopyBufferSubData")) return reinterpret_cast<web_function>(glCopyBufferSubData);
   // The page's renderer has its context to itself: there is nobody's vertex array to leave.
   return nullptr;
 }

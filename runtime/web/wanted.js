@@ -1,7 +1,7 @@
 // Levels of detail of a bundle that is larger than what a view may have: brought by ranges when a picture lacks them. Loaded with such.
 
-/** Requests at once: more fill a line with latency, and bring later what the view needs first. Set by hand. */
-const MOST_REQUESTS = 3;
+/** Requests at once: more fill a line with latency, and bring later what the view needs first. As many as HTTP/1.1 has connections. */
+const MOST_REQUESTS = 6;
 /** Pieces that are asked for together where they lie side by side. */
 const MOST_TOGETHER = 4;
 /** Ranges that are open at once: the view may have changed when the next ones are asked for. */
@@ -69,12 +69,13 @@ export class Wanted {
     return this.#engine.module._web_lod_error();
   }
 
-  /** After a picture: what it lacked. */
+  /** After a picture: what it lacked; more of it when something has come, however slow pictures are. */
   ask() {
     for (let next; this.#open.size < MOST_OPEN && (next = this.#numbers(this.#engine.module._web_open_wanted(), 3));) {
       const [number, offset, size] = next;
       this.#add(this.#piecesOf(offset, size), () => {
         this.#engine.module._web_have(number);
+        this.ask();
         this.#onMore();
       });
     }

@@ -6,7 +6,8 @@
 Makes the page of `modar web`, serves it by ranges, and flies: from far down to the surface, along it, and up again. Prints JSON:
 frames and the longest one (milliseconds, with the drawing, which is SwiftShader's on a CPU), the longest task of the page's own, bytes that
 came, the greatest number of bytes on the GPU, resident memory of all of the browser's processes beside a blank page's, and in pixels on the
-screen the error of what was drawn: at the end of each third of the flight, and by how much it fell at once (pop), the worst time.
+screen the error of what was drawn: at the end of each third of the flight, and by how much it fell at once (pop), the worst time; the
+triangles of those three pictures.
 Errors are those of the bundle's levels, which count shading too: the form differs by less.
 
 `modar-model-probe make SCAN TRIANGLES OUT.obj` makes a huge scan out of one; bake it with default options. Needs modar on the path,
@@ -32,7 +33,15 @@ from page_memory import resident_by_process, settle  # noqa: E402
 FLY = """(async () => {
   const [{ load }, { View }] = await Promise.all([import('/modar.js'), import('/modar-view.js')]);
   """ + CANVAS + """
-  const flown = globalThis.flown = { frames: 0, longest: 0, task: 0, gpu: 0, pop: 0, errors: [], done: false };
+  const flown = globalThis.flown = { frames: 0, longest: 0, task: 0, gpu: 0, pop: 0, errors: [], triangles: [], done: false };
+  let drawn = 0;
+  for (const name of ['drawElements', 'drawElementsInstanced']) {
+    const own = WebGL2RenderingContext.prototype[name];
+    WebGL2RenderingContext.prototype[name] = function (mode, count, ...rest) {
+      drawn += count / 3;
+      return own.call(this, mode, count, ...rest);
+    };
+  }
   new PerformanceObserver((list) => {
     for (const { duration } of list.getEntries()) flown.task = Math.max(flown.task, duration);
   }).observe({ type: 'longtask' });
@@ -58,6 +67,7 @@ FLY = """(async () => {
   for (let before = start, error = 0, third = 1; ;) {
     const now = await new Promise(requestAnimationFrame), share = (now - start) / 1000 / %(seconds)g;
     if (share >= 1) break;
+    drawn = 0;
     view.drawFrom(0, from(share), 500);
     if (flown.frames++ > 0) {
       flown.longest = Math.max(flown.longest, now - before);
@@ -65,8 +75,12 @@ FLY = """(async () => {
     }
     [before, error] = [now, view.lodError];
     flown.gpu = Math.max(flown.gpu, view.gpuBytes);
-    if (share > third / 3) flown.errors[third++ - 1] = error;
+    if (share > third / 3) {
+      flown.triangles[third - 1] = drawn;
+      flown.errors[third++ - 1] = error;
+    }
   }
+  flown.triangles.push(drawn);
   flown.errors.push(view.lodError);
   flown.done = true;
 })().catch((error) => { globalThis.flown = { done: true, error: String(error.stack ?? error) }; }), 0"""

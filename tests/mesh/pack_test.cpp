@@ -37,6 +37,19 @@ glm::vec3 position_at(const PackedMesh& mesh, std::uint64_t vertex) {
   return {half_at(at), half_at(at + 2), half_at(at + 4)};
 }
 
+/// Decoded corners of a level's triangles.
+std::multiset<std::array<float, 3>> corners_of(const PackedMesh& mesh, const LevelRecord& level) {
+  std::vector<std::uint16_t> indices(level.index_count);
+  std::memcpy(indices.data(), mesh.indices.data() + level.index_offset, 2 * indices.size());
+  std::multiset<std::array<float, 3>> corners;
+  for (const std::uint16_t index : indices) {
+    EXPECT_LT(index, level.vertex_count);
+    const glm::vec3 p = position_at(mesh, level.vertex_offset / mesh.layout.stride + index);
+    corners.insert({p.x, p.y, p.z});
+  }
+  return corners;
+}
+
 TEST(Pack, KnownValuesByteForByte) {
   const PackedMesh mesh = packed(chunked(
       welded(
@@ -64,19 +77,6 @@ TEST(Pack, KnownValuesByteForByte) {
   EXPECT_EQ(mesh.record.position_error_max, 0.0);
   EXPECT_EQ(mesh.record.uv_error_max_texels, 0.0f);
   EXPECT_LT(mesh.record.normal_error_max_deg, 0.4f);
-}
-
-/// Decoded corners of a level's triangles.
-std::multiset<std::array<float, 3>> corners_of(const PackedMesh& mesh, const LevelRecord& level) {
-  std::vector<std::uint16_t> indices(level.index_count);
-  std::memcpy(indices.data(), mesh.indices.data() + level.index_offset, 2 * indices.size());
-  std::multiset<std::array<float, 3>> corners;
-  for (const std::uint16_t index : indices) {
-    EXPECT_LT(index, level.vertex_count);
-    const glm::vec3 p = position_at(mesh, level.vertex_offset / mesh.layout.stride + index);
-    corners.insert({p.x, p.y, p.z});
-  }
-  return corners;
 }
 
 /// Where levels use prefixes they have the same triangles, over the fewest vertices that a prefix
@@ -138,15 +138,7 @@ void expect_stated_errors(const ChunkedMesh& mesh, const PackedMesh& bytes) {
   double squares = 0;
   std::uint64_t count = 0;
   for (std::size_t c = 0; c < mesh.chunks.size(); ++c) {
-    const LevelRecord& level = bytes.levels[bytes.chunks[c].first_level];
-    std::vector<std::uint16_t> indices(level.index_count);
-    std::memcpy(indices.data(), bytes.indices.data() + level.index_offset, 2 * indices.size());
-    std::multiset<std::array<float, 3>> found;
-    for (const std::uint16_t index : indices) {
-      ASSERT_LT(index, level.vertex_count);
-      const glm::vec3 p = position_at(bytes, level.vertex_offset / bytes.layout.stride + index);
-      found.insert({p.x, p.y, p.z});
-    }
+    const auto found = corners_of(bytes, bytes.levels[bytes.chunks[c].first_level]);
     std::multiset<std::array<float, 3>> expected;
     for (const std::uint16_t index : mesh.chunks[c].indices) {
       const glm::vec3 p = nearest_halves(mesh.mesh.positions[mesh.chunks[c].vertices[index]]);

@@ -37,6 +37,19 @@ std::vector<std::byte> blocks_of(std::uint32_t side, unsigned seed) {
   return blocks;
 }
 
+/// Makes of the last model, of one chunk, a stand-in of the one before.
+void make_stand_in(BundleContent& content, float error) {
+  content.models.pop_back();
+  const auto model = static_cast<std::uint32_t>(content.models.size() - 1);
+  content.stand_ins.push_back({model, 0, 1, 0});
+  content.stand_in_chunks.push_back(content.chunks.back());
+  content.stand_in_levels.push_back(content.levels.back());
+  content.stand_in_chunks[0].first_level = 0;
+  content.stand_in_levels[0].error = error;
+  content.chunks.pop_back();
+  content.levels.pop_back();
+}
+
 /// Two chunks with a stand-in of one, and a textured square of levels with alpha, so many texels
 /// wide.
 BundleContent two_kinds(std::uint32_t texels = 16) {
@@ -65,17 +78,8 @@ BundleContent two_kinds(std::uint32_t texels = 16) {
   maker.add_model(coloured, {{{strip(-0.5, 0, {255, 0, 0})}, {0.0f}, plain, {}},
                              {{strip(0, 0.5, {0, 255, 0})}, {0.0f}, plain, {}}});
   maker.add_model(coloured, {{{strip(-0.5, 0.5, {0, 0, 255})}, {0.0f}, plain, {}}});
-  BundleContent& content = maker.content;
-  const ModelRecord last = content.models.back();
-  content.models.pop_back();
-  content.stand_ins.push_back({1, 0, 1, 0});
-  content.stand_in_chunks.push_back(content.chunks.back());
-  content.stand_in_levels.push_back(content.levels.back());
-  content.stand_in_chunks[0].first_level = 0;
-  content.stand_in_levels[0].error = 0.1f;
-  content.chunks.resize(last.first_chunk);
-  content.levels.pop_back();
-  return content;
+  make_stand_in(maker.content, 0.1f);
+  return maker.content;
 }
 
 class ComingTest : public GlTest {
@@ -255,6 +259,74 @@ TEST_F(WantedTest, WithinABudget) {
     EXPECT_LE(used.geometry + used.textures + used.batches, texture / 2);
   }
   EXPECT_EQ(blue_pixels(picture(*renderer)), 0) << geometry << " bytes fit";
+}
+
+/// A red chunk whose coarser level, green, uses the first of its vertices, and a blue stand-in.
+BundleContent prefixes() {
+  SceneMaker maker;
+  const std::uint32_t material = maker.add_material(flat_material());
+  const std::uint32_t layout = maker.add_layout(Layout::kHalfColoured);
+  const auto square = [](const Rgb& tint) {
+    const glm::dvec3 a(-0.5, -0.5, 0), b(0.5, -0.5, 0), c(0.5, 0.5, 0), d(-0.5, 0.5, 0);
+    return std::vector<Triangle>{{{a, b, c}, {}, tint}, {{a, c, d}, {}, tint}};
+  };
+  maker.add_model(layout, {{{square({0, 255, 0}), square({255, 0, 0})}, {}, material, {}}}, true);
+  maker.add_model(layout, {{{square({0, 0, 255})}, {}, material, {}}});
+  BundleContent& content = maker.content;
+  make_stand_in(content, 5.0f);
+  std::swap(content.levels[0], content.levels[1]);
+  content.levels[0].error = 0.0f;
+  content.levels[1].error = 0.05f;
+  return content;
+}
+
+/// What has come for a coarser level is not brought again with the rest.
+TEST_F(WantedTest, LevelsShareTheFrontOfTheirVertices) {
+  const MappedBundle whole_bundle(prefixes());
+  ASSERT_TRUE(whole_bundle.view);
+  const auto all = whole_bundle.file.bytes();
+  Memory part(all);
+  std::fill(part.bytes().begin() + static_cast<std::ptrdiff_t>(gpu_start(part.view)),
+            part.bytes().end(), std::byte{0});
+  for (const StageRange& range : kept_ranges(part.view)) {
+    std::copy_n(all.begin() + static_cast<std::ptrdiff_t>(range.offset), range.size,
+                part.bytes().begin() + static_cast<std::ptrdiff_t>(range.offset));
+  }
+  GlCaps caps = probe_gl_caps();
+  caps.gpu_memory = 1 << 20;
+  auto made = Renderer::create_part(part.view, caps, Renderer::Part::kWanted);
+  ASSERT_TRUE(made) << made.error().cause;
+  Renderer& renderer = **made;
+  renderer.set_options(flat_light());
+  const auto seen = [&](float distance) {
+    const DrawItem item{0, glm::translate(glm::mat4(1.0f), {0.0f, 0.0f, -distance})};
+    const auto pixels = draw(renderer, default_camera(96, 72), std::span(&item, 1));
+    const std::size_t middle = 4 * (36 * 96 + 48);
+    return std::array<int, 3>{pixels[middle], pixels[middle + 1], pixels[middle + 2]};
+  };
+  // Answers the bytes of vertices that were asked for.
+  const auto come = [&] {
+    std::uint64_t vertices = 0;
+    const auto first =
+        static_cast<std::uint64_t>(part.view.vertices().data() - part.view.bytes().data());
+    for (;;) {
+      const Renderer::Wanted wanted = renderer.open_wanted();
+      if (wanted.number == kNone) return vertices;
+      renderer.put(wanted.offset, all.subspan(wanted.offset, wanted.size));
+      renderer.have(wanted.number);
+      if (wanted.offset - first < part.view.vertices().size()) vertices += wanted.size;
+    }
+  };
+  constexpr std::array<int, 3> kRed = {255, 0, 0}, kGreen = {0, 255, 0}, kBlue = {0, 0, 255};
+  const std::uint64_t half = 6ull * part.view.layouts()[0].stride;
+  EXPECT_EQ(seen(20), kBlue);
+  EXPECT_EQ(come(), half) << "the coarser level's";
+  EXPECT_EQ(seen(20), kGreen);
+  EXPECT_EQ(seen(2), kGreen) << "until the finer one has come";
+  EXPECT_EQ(come(), half) << "the rest";
+  EXPECT_EQ(seen(2), kRed);
+  EXPECT_EQ(come(), 0u);
+  EXPECT_EQ(seen(20), kGreen);
 }
 
 TEST_F(WantedTest, NeedsAContextThatDrawsTexturesInPart) {
