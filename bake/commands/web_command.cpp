@@ -67,17 +67,24 @@ Result<ExitCode> run_web(WebCommand& command) {
   note_release(command);
   MODAR_ASSIGN(const Site site, write_site(command.options));
   if (command.json) {
-    const Json json = {{"folder", command.options.output},    {"page_bytes", site.page_bytes},
-                       {"bundle_bytes", site.bundle_bytes},   {"packed_bytes", site.packed_bytes},
-                       {"trimmed_bytes", site.trimmed_bytes}, {"files", Json::list(site.files)}};
+    const Json json = {{"folder", command.options.output},  {"page_bytes", site.page_bytes},
+                       {"bundle_bytes", site.bundle_bytes}, {"packed_bytes", site.packed_bytes},
+                       {"ranged_bytes", site.ranged_bytes}, {"trimmed_bytes", site.trimmed_bytes},
+                       {"files", Json::list(site.files)}};
     std::fputs(json.dump().c_str(), stdout);
   } else if (!command.quiet) {
     std::fprintf(stderr, "wrote %s: %zu files, page and engines %s, bundles %s\n",
                  command.options.output.c_str(), site.files.size(),
                  human_bytes(site.page_bytes).c_str(), human_bytes(site.bundle_bytes).c_str());
-    if (site.packed_bytes != 0) {
+    if (site.packed_bytes != site.ranged_bytes) {
       std::fprintf(stderr, "first visits load the bundles packed: %s\n",
-                   human_bytes(site.packed_bytes).c_str());
+                   human_bytes(site.packed_bytes - site.ranged_bytes).c_str());
+    }
+    if (site.ranged_bytes != 0) {
+      std::fprintf(stderr,
+                   "visits bring what is seen of large bundles, by ranges: of %s, if the host has "
+                   "ranges\n",
+                   human_bytes(site.ranged_bytes).c_str());
     }
     if (site.trimmed_bytes != 0) {
       std::fprintf(stderr, "left out: keypoints of the ModAR paper's method, %s\n",

@@ -284,6 +284,7 @@ Result<std::string> put_bytes(Draft& draft, const std::string& stem,
   // Of a larger one the page brings what is seen, level by level: a phone that was to keep all of
   // it for visits without a network would fetch hundreds of megabytes beside that.
   const bool whole = bytes.size() <= kMostWhole;
+  if (!whole) draft.site.ranged_bytes += packed.size();
   MODAR_TRY(whole ? put(draft, stem + ".packed", packed, query)
                   : put_online(draft, stem + ".packed", packed));
   return stem + ".packed" + query;

@@ -38,6 +38,7 @@ struct Site {
   std::uint64_t page_bytes = 0;     ///< of page and engines: what every site has
   std::uint64_t bundle_bytes = 0;   ///< of the bundles, without what pages do not read
   std::uint64_t packed_bytes = 0;   ///< of the same, as a first visit loads them; 0 for live pages
+  std::uint64_t ranged_bytes = 0;   ///< of these, in bundles of which it brings what is seen only
   std::uint64_t trimmed_bytes = 0;  ///< left out of the bundles: see formats/trim.hpp
 };
 

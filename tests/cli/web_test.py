@@ -70,6 +70,7 @@ class Web(ProgramTest):
         shown = self.read("bundles/red-vase.modar")
         self.assertEqual(len(bundle.read_bytes()) - len(shown), written["trimmed_bytes"])
         self.assertGreater(written["trimmed_bytes"], 0)
+        self.assertEqual(written["ranged_bytes"], 0, "small bundles are brought whole")
         self.assertEqual(self.modar("check", self.folder / "site/bundles/red-vase.modar").returncode, 0)
         for script in ("app.js", "engine.js", "viewer-parts.js"):
             self.assertEqual(self.read(script), (self.page / script).read_bytes(), script)
