@@ -169,9 +169,9 @@ void RayTree::build(std::uint32_t node, const Part& part, int depth) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto a = static_cast<int>(axis);
       // No ray enters what is no number.
-      constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-      nodes_[node].low[axis][i] = i < count ? static_cast<float>(box.low[a] - slack) : kNone;
-      nodes_[node].high[axis][i] = i < count ? static_cast<float>(box.high[a] + slack) : kNone;
+      constexpr float kNoBox = std::numeric_limits<float>::quiet_NaN();
+      nodes_[node].low[axis][i] = i < count ? static_cast<float>(box.low[a] - slack) : kNoBox;
+      nodes_[node].high[axis][i] = i < count ? static_cast<float>(box.high[a] + slack) : kNoBox;
     }
     if (i >= count) continue;
     if (parts[i].items.size() <= kRayLeaf) {
