@@ -29,6 +29,7 @@ NOT_RUN = (
     (r"^export ANDROID_NDK=|^scripts/apk\.sh ", "needs an NDK; apk_test.py uses a compiler in its place"),
     (r"^adb |^for phone in |^  adb |^done$", "needs a phone"),
     (r"tests/bench/media_page\.py", "takes minutes, and a browser"),
+    (r"^scripts/tune\.py ", "takes minutes; tune_test.py"),
     (r"^modar-lab bench (pose|wild|extended|clutter|light|model|render|lod|etc1) ", "takes minutes; the tests of bake/lab"),
 )
 

@@ -640,10 +640,14 @@ class Page(ProgramTest):
         self.browser.run("globalThis.loser = part('models').getContext('webgl2').getExtension('WEBGL_lose_context'), loser.loseContext()")
         self.browser.wait("part('models').getContext('webgl2').isContextLost()", "the loss")
         # Lost again before the page can make use of it, as where the driver is still busy with what it lost.
-        self.browser.run("""part('models').parentNode.addEventListener('webglcontextrestored', () => loser.loseContext(), { capture: true, once: true }),
-            loser.restoreContext()""")
-        self.browser.wait("part('models').getContext('webgl2').isContextLost()", "the second loss")
-        self.browser.run("new Promise((done) => setTimeout(done, 300))")
+        self.browser.run("""new Promise((done) => {
+          const models = part('models');
+          models.parentNode.addEventListener('webglcontextrestored', () => {
+            models.addEventListener('webglcontextlost', () => setTimeout(done, 300), { once: true });
+            loser.loseContext();
+          }, { capture: true, once: true });
+          loser.restoreContext();
+        })""")
         self.browser.run("loser.restoreContext()")
         self.browser.wait(f"({DRAWN}) > 500", "models after the loss")
         self.assertEqual(self.browser.errors, [])
