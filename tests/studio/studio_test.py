@@ -424,6 +424,7 @@ class Page(StudioTest):
         self.start()
         hand = self.hand
         hand.run("location.hash = '#/picture/band'")
+        hand.wait("document.querySelector('canvas[data-shown]')", "the preview, below which the lengths are")
         hand.click("input[value=a4]")
         self.wait_for("width-mm = 297")
         hand.wait("document.querySelector('.advice a')", "the twin, which is a rival")
