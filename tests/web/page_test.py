@@ -472,7 +472,7 @@ class Page(ProgramTest):
         ms = [self.browser.run(f"performance.getEntriesByName('modar: {each}')[0].startTime - performance.getEntriesByName('modar: camera')[0].startTime")
               for each in ("tracked", "seen")]
         print("from the camera to the first tracked frame {:.0f} ms, to the model {:.0f} ms".format(*ms))
-        self.browser.wait("performance.getEntriesByName('modar: coarse').length > 0", "the model, which comes after the picture")
+        self.browser.wait(f"({DRAWN}) > 5000", "the model, which comes after the picture")
         self.keep("stage-portrait.png")
         self.assertEqual(self.browser.run("part('label-name').textContent"), "The book of owls")
         # Long after the models were drawn: browsers have emptied their canvas by then. What the picture shows alone is kept.
