@@ -14,9 +14,9 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kLook(25);
-constexpr int kRest = 20;                      // times what a look took: 5 % of a core at most
-constexpr std::size_t kMostWatched = 100'000;  // that are looked at
+constexpr std::chrono::milliseconds kLook(25);  // of which a change waits half; a sleep is as long
+constexpr int kRest = 20;                       // times what a look took: 5 % of a core at most
+constexpr std::size_t kMostWatched = 100'000;   // that are looked at
 
 /// Change with names, sizes and times: FNV-1a.
 struct FolderState {

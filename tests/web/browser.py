@@ -16,12 +16,11 @@ FIREFOX = shutil.which("firefox-esr") or shutil.which("firefox")
 WEBKIT = next(iter(sorted(pathlib.Path("/usr/lib").glob("*/webkit2gtk-4*/MiniBrowser"))), None)
 XVFB = shutil.which("Xvfb")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-# SwiftShader: the same pixels on every machine.
+# WebGL by SwiftShader: the same pixels on every machine. Pages are painted without it, in two thirds of the CPU time.
 FLAGS = ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--enable-unsafe-swiftshader",
          "--use-fake-device-for-media-stream", "--no-first-run", "--disable-background-networking",
          "--disable-component-update", "--disable-default-apps", "--disable-sync", "--hide-scrollbars",
          "--force-color-profile=srgb", "--remote-debugging-pipe"]
-# An element of a page, or of the viewer in it.
 # A new canvas on the page, for View.create().
 CANVAS = """const canvas = (width, height) => {
     const made = document.createElement('canvas');
@@ -29,6 +28,7 @@ CANVAS = """const canvas = (width, height) => {
     document.body.append(made);
     return made;
   };"""
+# An element of a page, or of the viewer in it.
 PART = """globalThis.part = (id) => document.getElementById(id)
   ?? document.querySelector('modar-viewer').shadowRoot.getElementById(id)"""
 
