@@ -29,9 +29,6 @@ constexpr int kRatio = 90;
 static_assert(kMaxDistance * 100 / kRatio < 128);  // what unambiguous() compares four at a time
 // Pattern pixels within which the second best is the same point seen in another baked view.
 constexpr double kSamePoint = 6.0;
-// Matches whose affine map is voted on, those of least distance first: their number times that of
-// the matches is the vote's cost.
-constexpr std::size_t kMaxVotes = 96;
 // Votes that are fitted; those that lead to a hypothesis again are dropped. Bounds the time in
 // clutter, where no vote leads anywhere.
 constexpr int kMaxFits = 8;
@@ -105,19 +102,19 @@ bool alike(const glm::dmat2& a, const glm::dmat2& b) {
 
 bool agrees(const FeatureMatch& hypothesis, const FeatureMatch& other) {
   const glm::dmat2& a = hypothesis.affine;
+  if (!alike(a, other.affine)) return false;  // rules most out
   const glm::dvec2 away = a * (other.pattern - hypothesis.pattern);
   const glm::dvec2 miss = away + hypothesis.ideal - other.ideal;
   // Four pixels of the feature's level, and a quarter of the way for what orientation and scale of
   // one feature are off by, perspective included; in shape 0.6 of the map's norm. The
   // fit that follows sorts out what they let in. Swept on area 0.02-0.05: 54.2, 56.7 and 57.5 %
-  // right with 2, 4 and 8 pixels. (a + b)^2 <= 2 a^2 + 2 b^2 rules most out without a root.
+  // right with 2, 4 and 8 pixels. (a + b)^2 <= 2 a^2 + 2 b^2 rules others out without a root.
   const double missed = glm::dot(miss, miss);
   const double way = glm::dot(away, away);
   const double near = 4.0 * other.sigma;
   if (!(missed < 2.0 * near * near + 0.125 * way)) return false;
   const double limit = near + 0.25 * std::sqrt(way);
-  if (!(missed < limit * limit)) return false;
-  return alike(a, other.affine);
+  return missed < limit * limit;
 }
 
 [[gnu::cold]] PlaneMatcher::PlaneMatcher(const Camera& camera, const Kernels& kernels,
@@ -340,8 +337,7 @@ std::size_t PlaneMatcher::fit(const FeatureMatch& hypothesis, glm::dmat3& homogr
   return collect(homography, 3.0, mask_);
 }
 
-/// Counts the supporters of the nearest matches.
-void PlaneMatcher::rank_votes() {
+void PlaneMatcher::begin_vote(std::size_t most) {
   order_.clear();
   for (std::uint32_t i = 0; i < matches_.size(); ++i) order_.push_back(i);
   std::sort(order_.begin(), order_.end(), [this](std::uint32_t a, std::uint32_t b) {
@@ -349,11 +345,20 @@ void PlaneMatcher::rank_votes() {
                ? matches_[a].distance < matches_[b].distance
                : a < b;
   });
-  if (order_.size() > kMaxVotes) order_.resize(kMaxVotes);
-  for (const std::uint32_t i : order_) {
-    supporters_[i] =
-        static_cast<std::uint8_t>(std::min<std::size_t>(support(matches_[i], nullptr), 255));
+  if (order_.size() > most) order_.resize(most);
+  supporters_.assign(matches_.size(), 0);
+  voted_ = 0;
+}
+
+bool PlaneMatcher::vote(std::int64_t& work) {
+  constexpr std::int64_t kMatchCost = 20;  // instructions, as scripts/foreign.sh counts them
+  for (; voted_ < order_.size(); ++voted_) {
+    if (work <= 0) return false;
+    work -= kMatchCost * static_cast<std::int64_t>(matches_.size());
+    const std::size_t count = support(matches_[order_[voted_]], nullptr);
+    supporters_[order_[voted_]] = static_cast<std::uint8_t>(std::min<std::size_t>(count, 255));
   }
+  return true;
 }
 
 std::span<const HomographyHypothesis> PlaneMatcher::find(const TrackedPattern& pattern,
@@ -361,6 +366,8 @@ std::span<const HomographyHypothesis> PlaneMatcher::find(const TrackedPattern& p
   std::size_t next = 0;
   std::int64_t work = std::numeric_limits<std::int64_t>::max();
   match(pattern, features, features.size(), features.size(), next, work);
+  begin_vote(kVotes);
+  vote(work);
   return hypotheses();
 }
 
@@ -368,8 +375,6 @@ std::span<const HomographyHypothesis> PlaneMatcher::hypotheses() {
   if (matches_.size() < kMinMatches) return {};
   mask_.assign(matches_.size(), 0);
   explained_.assign(matches_.size(), 0);
-  supporters_.assign(matches_.size(), 0);
-  rank_votes();
   std::size_t count = 0;
   for (int attempt = 0; attempt < kMaxFits && count < hypotheses_.size(); ++attempt) {
     std::uint32_t chosen = order_.front();

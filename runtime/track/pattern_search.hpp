@@ -74,6 +74,7 @@ class PatternSearch {
     kFeatures,
     kSelect,
     kMatch,
+    kVote,
     kHypotheses,
     kStart,
     kRefine,

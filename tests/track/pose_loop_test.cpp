@@ -161,6 +161,19 @@ TEST(PoseLoop, FindsSmallPatternsByTheSpareFeatures) {
   EXPECT_GT(with_them, without + 1);
 }
 
+// Codes of steep views match worse than others do by chance: a vote of the nearest alone finds 11.
+TEST(PoseLoop, FindsSteepPatternsByTheVotesOfAllMatches) {
+  SceneBand band;
+  band.area_low = 0.12;
+  band.area_high = 0.3;
+  band.tilt_low = 70;
+  band.tilt_high = 76;
+  PoseLoopOptions options;
+  options.track = false;
+
+  EXPECT_GE(found_in_frames(options, band, 40), 18);
+}
+
 TEST(PoseLoop, FindsThePatternWhereItIs) {
   PoseLoopOptions options;
   options.track = false;
