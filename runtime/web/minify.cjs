@@ -6,7 +6,7 @@ const { basename, dirname, join } = require('path');
 const { minify } = require('terser');
 
 /** ES2021: what the browsers of CMakeLists.txt's MIN_..._VERSION understand as it stands. */
-const OPTIONS = { ecma: 2021, compress: { passes: 2 } };
+const OPTIONS = { ecma: 2021, compress: { passes: 4 } };
 /** These get what they import written into them: one request, instead of one after the other. */
 const BUNDLED = ['app.js', 'modar-worker-plain.js', 'modar-worker-simd.js'];
 /** But for what page and worker share, and loaders. */

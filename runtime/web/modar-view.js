@@ -13,6 +13,8 @@ const MOST_BYTES = 64 << 20;
 /** Milliseconds without a frame after which what turns by itself is drawn without one. */
 const STILL_MS = 60;
 const LIGHT_WIDTH = 160;
+/** Milliseconds that finer models take to replace coarser ones, and how much of a pose may change meanwhile: some pixels. Set by hand. */
+const FADE_MS = 250, FADE_MOVED = 0.03;
 
 function openContext(canvas, webgl1) {
   const attributes = { alpha: true, premultipliedAlpha: true, depth: true, stencil: false, antialias: true };
@@ -73,6 +75,8 @@ export class View extends EventTarget {
   #handle = 0;
   #covered = new Map();
   #drawings = 0;
+  /** {copy: a canvas that fades, poses: of what it shows} */
+  #faded = null;
 
   /**
    * @param {Modar | Uint8Array | Promise<Modar | Uint8Array>} bundle which may still be on its way
@@ -124,6 +128,7 @@ export class View extends EventTarget {
     const wanted = new Wanted(this.#engine, arrival.parts(), () => this.#tellRefined());
     if (!await wanted.begin()) return false;
     await this.#restored;
+    this.#fade();
     try {
       wanted.show(this.#maxBytes, this.#fixedLight);
     } catch (error) {
@@ -133,6 +138,29 @@ export class View extends EventTarget {
     this.#wanted = wanted;
     this.#told();
     return true;
+  }
+
+  /** What is drawn now fades over what is drawn from now on, while the models stand still. */
+  #fade() {
+    if (this.#empty || this.#lost || !this.#drawnAt || !this.#models.isConnected) return;
+    const models = this.#models;
+    const copy = models.cloneNode();
+    copy.removeAttribute('id');
+    const { offsetLeft, offsetTop, clientWidth, clientHeight } = models;
+    copy.style = `position:absolute;left:${offsetLeft}px;top:${offsetTop}px;width:${clientWidth}px;height:${clientHeight}px;pointer-events:none`;
+    this.#redraw();
+    copy.getContext('2d').drawImage(models, 0, 0);
+    models.after(copy);
+    copy.animate({ opacity: [1, 0] }, FADE_MS).onfinish = () => copy.remove();
+    this.#faded = { copy, poses: this.#engine.poses().slice() };
+  }
+
+  /** A picture of other poses would be seen beside the models. */
+  #endFade() {
+    const poses = this.#engine.poses();
+    if (!this.#faded?.poses.some((value, i) => i % POSE_FLOATS >= POSE.view && Math.abs(value - poses[i]) > FADE_MOVED)) return;
+    this.#faded.copy.remove();
+    this.#faded = null;
   }
 
   #showCoarse() {
@@ -158,6 +186,7 @@ export class View extends EventTarget {
       arrival = await arrival.again();
     }
     this.#arrival = arrival;
+    this.#fade();
     this.#engine.showAll(this.#fixedLight);
     this.#told();
   }
@@ -289,6 +318,7 @@ export class View extends EventTarget {
 
   /** Acts and draws what was drawn last. */
   #again() {
+    this.#endFade();
     this.#act();
     this.#redraw();
     this.#wanted?.ask();

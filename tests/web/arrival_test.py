@@ -26,6 +26,18 @@ DRAW = """(async () => {
     const bytes = await (await view.photograph('image/png')).arrayBuffer();
     return [...new Uint8Array(await crypto.subtle.digest('SHA-1', bytes))].join();
   };
+  // What fades away over the models, as hash() has it: on black.
+  const fading = async () => {
+    const [picture, , copy] = document.querySelectorAll('canvas');
+    if (!copy) return null;
+    const on = Object.assign(document.createElement('canvas'), { width: picture.width, height: picture.height });
+    const context = on.getContext('2d', { alpha: false });
+    context.drawImage(copy, 0, 0);
+    const bytes = await (await new Promise((resolve) => { on.toBlob(resolve, 'image/png'); })).arrayBuffer();
+    const [{ effect }] = copy.getAnimations();
+    const seen = [...new Uint8Array(await crypto.subtle.digest('SHA-1', bytes))].join();
+    return { seen, to: effect.getKeyframes().at(-1).opacity, ms: effect.getTiming().duration };
+  };
   const got = [], drawn = {};
   let modar;
   try {
@@ -46,7 +58,10 @@ DRAW = """(async () => {
     drawn.lost = when === true && await lose();
     if (!modar.arrival.inOrder) drawn.coarse = await coarse;
     await view.whole;
+    drawn.fading = await fading();
     drawn.whole = await hash(view);
+    view.drawFrom(0, Float32Array.of(1, 0, 0, 0, 0, 0.6, -0.8, 0, 0, 0.8, 0.6, 0, 0, 0, -1.6, 1), 300);
+    drawn.left = document.querySelectorAll('canvas').length;
     drawn.kept = view.bytes.reduce((count, byte) => count + (byte !== 0), 0);
     if (when === 'after') {
       const refined = new Promise((resolve) => view.addEventListener('refined', resolve, { once: true }));
@@ -170,8 +185,10 @@ class Arrival(ProgramTest):
         self.assertEqual(self.wanted["first"], self.wanted["whole"])
         drawn = self.draw("'/right/demo.packed'")
         print(f"raw {self.raw} bytes, packed {len(self.http.packed)}, the patterns {sum(size for _, size, stage in self.pieces if stage == 1)}")
+        self.assertEqual(drawn.pop("fading"), {"seen": drawn["coarse"], "to": "0", "ms": 250}, "coarse models fade away over fine ones")
+        self.assertIsNone(self.wanted["fading"])
         self.assertEqual({**drawn, "coarse": 0, "first": 0},
-                         {"coarse": 0, "first": 0, "refined": 2, "whole": self.wanted["whole"], "patterns": ["cover"], "lost": False,
+                         {"coarse": 0, "first": 0, "left": 2, "refined": 2, "whole": self.wanted["whole"], "patterns": ["cover"], "lost": False,
                           "kept": self.wanted["kept"], "progress": [len(self.http.packed)] * 2})
         # First nothing, then something that is not all.
         self.assertEqual(len({drawn["first"], drawn["coarse"], drawn["whole"]}), 3)
