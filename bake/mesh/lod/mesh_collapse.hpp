@@ -67,6 +67,8 @@ class MeshCollapser {
   /// The triangles that are left, in the order in which they came.
   [[nodiscard]] std::vector<CollapseFace> faces() const;
   [[nodiscard]] const CollapseMesh& mesh() const { return mesh_; }
+  /// Is a triangle of the mesh left? By its number there.
+  [[nodiscard]] bool has(std::uint32_t face) const { return alive_[face] != 0; }
   /// The place that a place has become.
   std::uint32_t place_of(std::uint32_t place);
 

@@ -15,6 +15,7 @@
 #include <glm/geometric.hpp>
 
 #include "bake/mesh/lod/chunk_decimate.hpp"
+#include "bake/mesh/lod/collapse_bound.hpp"
 #include "bake/mesh/lod/level_map.hpp"
 #include "bake/mesh/lod/pixel_cells.hpp"
 #include "bake/mesh/lod/surface_distance.hpp"
@@ -60,6 +61,8 @@ constexpr std::size_t kLookStep = 6;  ///< indices
 /// that one may be from nearly the same distance on. Bundles of five scans are smaller by 1 to 11 %
 /// without such levels, that of a rough grid by 17 %.
 constexpr double kAlike = 0.9;
+/// Where collapses leave more than one in so many triangles open, a map of the whole is faster.
+constexpr std::size_t kMostOpen = 8;
 constexpr std::size_t kChunksPerUpdate = 8;  ///< chunks between two updates of the progress bar
 
 /// Vertices that differ in their normals only, as one: flat-shaded models have one for every corner
@@ -375,25 +378,93 @@ struct MeasuredLevel {
   double error = 0;
 };
 
-/// Measures a level: its distance from a finer one, and that one's from the finest. Returns for
-/// each vertex a triangle near it; kNoIndex for those that neither that one nor a texture has.
-std::vector<std::uint32_t> measure(MeasuredLevel& level, std::vector<MeasuredLevel>& finer,
-                                   std::span<const glm::dvec3> positions,
-                                   const std::vector<std::uint16_t>& become,
-                                   std::span<const glm::dvec2> texels) {
-  const double least = finer.back().error;
-  const auto exact = [&](const MeasuredLevel& other) { return other.error <= kNegligible * least; };
-  MeasuredLevel& from = *std::find_if(finer.rbegin(), finer.rend(), exact);
+/// Of each vertex of some triangles of a finer level, a triangle of a level near it.
+std::vector<std::uint32_t> near_vertices(const MeasuredLevel& level,
+                                         std::span<const std::uint16_t> finer,
+                                         std::span<const glm::dvec3> positions,
+                                         const std::vector<std::uint16_t>& become) {
   std::vector<std::uint32_t> nearby = level.of_vertices;
-  for (std::size_t v = 0; v < positions.size(); ++v) {
-    if (become[v] == v || nearby[become[v]] == kNoIndex) continue;
-    if (from.of_vertices[v] == kNoIndex && texels.empty()) continue;
+  for (const std::uint16_t v : finer) {
+    if (nearby[v] != kNoIndex || nearby[become[v]] == kNoIndex) continue;
     nearby[v] = level.surface.walk(positions[v], nearby[become[v]]);
   }
-  const double distance =
-      level_distance(from.surface, level.surface, nearby, from.of_vertices, least - from.error);
-  level.error = std::max(least, from.error + distance);
   return nearby;
+}
+
+/// What the collapses from the finest level to another tell of its distance: no part that is
+/// settled is farther off than `most`.
+CollapseBound settled_by_collapses(const MeasuredLevel& level, const MeasuredLevel& finest,
+                                   std::span<const glm::dvec3> positions,
+                                   const std::vector<std::uint16_t>& become, double most) {
+  std::vector<double> moved(positions.size(), 0.0);
+  for (std::size_t v = 0; v < positions.size(); ++v) {
+    if (finest.of_vertices[v] == kNoIndex) continue;
+    const glm::dvec3 way = positions[become[v]] - positions[v];
+    moved[v] = level.of_vertices[become[v]] != kNoIndex ? glm::dot(way, way)
+                                                        : std::numeric_limits<double>::infinity();
+  }
+  const auto lands = [&](std::uint32_t t) {
+    const std::uint16_t* v = finest.surface.corners(t);
+    const std::uint16_t a = become[v[0]];
+    const std::uint16_t b = become[v[1]];
+    const std::uint16_t c = become[v[2]];
+    if (a != b && b != c && c != a) return true;
+    const std::uint16_t other = a != b ? b : c;
+    return a == other || level.surface.has_edge(a, other) || level.surface.has_edge(other, a);
+  };
+  return collapse_bound(finest.surface, std::span<const double>(moved), lands, most);
+}
+
+/// Measures what collapses leave open of a level's distance from the finest: one by one.
+double distance_of_open(MeasuredLevel& level, MeasuredLevel& finest,
+                        std::span<const glm::dvec3> positions,
+                        const std::vector<std::uint16_t>& become, const CollapseBound& bound,
+                        double least) {
+  std::vector<std::uint16_t> corners;
+  for (const std::uint32_t t : bound.open) {
+    corners.insert(corners.end(), finest.surface.corners(t), finest.surface.corners(t) + 3);
+  }
+  const std::vector<std::uint32_t> nearby = near_vertices(level, corners, positions, become);
+  const double up =
+      surface_distance(finest.surface, level.surface, nearby, least, 0, bound.settled);
+  // Each triangle is what one of the finest has become, in the same order.
+  std::vector<std::uint8_t> covered;
+  covered.reserve(level.surface.triangles());
+  for (std::uint32_t t = 0; t < finest.surface.triangles(); ++t) {
+    const std::uint16_t* v = finest.surface.corners(t);
+    if (become[v[0]] == become[v[1]] || become[v[1]] == become[v[2]] ||
+        become[v[2]] == become[v[0]]) {
+      continue;
+    }
+    covered.push_back(bound.settled[t]);
+  }
+  return surface_distance(level.surface, finest.surface, finest.of_vertices, up, 0, covered);
+}
+
+/// Measures a level: by the collapses from the finest where they tell enough, or its distance from
+/// a finer one, and that one's from the finest. hidden: a distance that need not be told apart.
+void measure(MeasuredLevel& level, std::vector<MeasuredLevel>& finer,
+             std::span<const glm::dvec3> positions, const std::vector<std::uint16_t>& become,
+             double hidden) {
+  const double least = finer.back().error;
+  const double enough = std::max(least, hidden);
+  MeasuredLevel& finest = finer.front();
+  const CollapseBound bound = settled_by_collapses(level, finest, positions, become, enough);
+  if (bound.open.empty()) {
+    level.error = std::max(least, bound.moved);
+  } else if (bound.open.size() * kMostOpen < finest.surface.triangles()) {
+    level.error =
+        distance_of_open(level, finest, positions, become, bound, std::max(least, bound.moved));
+  } else {
+    const auto exact = [&](const MeasuredLevel& other) {
+      return other.error <= kNegligible * least;
+    };
+    MeasuredLevel& from = *std::find_if(finer.rbegin(), finer.rend(), exact);
+    const double distance = level_distance(from.surface, level.surface,
+                                           near_vertices(level, from.indices, positions, become),
+                                           from.of_vertices, enough - from.error);
+    level.error = from.error + distance;
+  }
 }
 
 /// Greatest distance of the uv of a removed vertex from that of the surface at the nearest point.
@@ -444,13 +515,15 @@ class ChunkLooker {
         cells_(points_) {}
 
   /// As ChunkLevel::shading. level: its triangles, with the vertices that carry their normals.
-  /// nearby: of each vertex a triangle near it, or kNoIndex.
-  double shading(const LevelSurface& surface, const std::vector<std::uint16_t>& level,
-                 const std::vector<std::uint32_t>& nearby) {
+  /// become: what each vertex of the finest has become.
+  double shading(const MeasuredLevel& measured, const std::vector<std::uint16_t>& level,
+                 const std::vector<std::uint16_t>& become) {
+    const LevelSurface& surface = measured.surface;
     std::vector<LookDifference> differences(points_.size());
     for (std::size_t i = 0; i < differences.size(); ++i) {
       const std::uint16_t* own = &chunk_.indices[step_ * i];
-      const std::uint32_t start = nearby[merged_.first.empty() ? own[0] : merged_.first[own[0]]];
+      const std::uint16_t first = merged_.first.empty() ? own[0] : merged_.first[own[0]];
+      const std::uint32_t start = measured.of_vertices[become[first]];
       if (start == kNoIndex) continue;
       const std::uint32_t t = surface.walk(points_[i], start);
       const ClosestPoint closest = closest_point(points_[i], surface.triangle(t));
@@ -488,10 +561,11 @@ class ChunkLooker {
   PixelCells cells_;
 };
 
-/// Fills one chunk's coarser levels: what it is after the collapses ahead of each cut.
+/// Fills one chunk's coarser levels: what it is after the collapses ahead of each cut. hidden: the
+/// share of what shading shows below which distances are not told apart.
 void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkGrid& grid,
                  const LevelOptions& options, const CollapseSequence& sequence,
-                 const std::vector<Cut>& cuts, Chunk& chunk) {
+                 const std::vector<Cut>& cuts, double hidden, Chunk& chunk) {
   const std::vector<glm::dvec3> positions = decoded_positions(mesh, chunk, options.positions, grid);
   DecimateLimits limits;
   const std::vector<glm::dvec2> texels =
@@ -509,15 +583,18 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkG
     const std::vector<std::uint16_t> become =
         collapsed_vertices(sequence, collapses, positions.size());
     MeasuredLevel coarser(positions, collapsed_triangles(finest, become));
-    const std::vector<std::uint32_t> nearby = measure(coarser, levels, positions, become, texels);
     ChunkLevel& level = chunk.coarser.emplace_back();
     level.halvings = cut.halvings;
-    level.uv_shift = greatest_uv_shift(coarser.surface, {positions, texels}, become, nearby,
-                                       limits.max_uv_shift);
-    level.error = coarser.error;
+    if (!texels.empty()) {
+      level.uv_shift =
+          greatest_uv_shift(coarser.surface, {positions, texels}, become,
+                            near_vertices(coarser, finest, positions, become), limits.max_uv_shift);
+    }
     level.indices = coarser.indices;
     split_normals(mesh, chunk, merged, positions, level.indices);
-    level.shading = looker.shading(coarser.surface, level.indices, nearby);
+    level.shading = looker.shading(coarser, level.indices, become);
+    measure(coarser, levels, positions, become, hidden * level.shading);
+    level.error = coarser.error;
     levels.push_back(std::move(coarser));
   }
 }
@@ -571,8 +648,10 @@ Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report&
                             options.positions, options.texture_sides, halvings.back());
   });
   const std::vector<Cut> cuts = cuts_for(mesh, sequences, halvings);
+  const double hidden = triangles_in(mesh) > options.measured_triangles ? kHidden : 0.0;
   each_chunk(0.5, [&](std::size_t c) {
-    level_chunk(mesh.mesh, merged[c], grids[c], options, sequences[c], cuts, mesh.chunks[c]);
+    level_chunk(mesh.mesh, merged[c], grids[c], options, sequences[c], cuts, hidden,
+                mesh.chunks[c]);
     sequences[c] = {};
   });
   std::uint64_t fine = 0;

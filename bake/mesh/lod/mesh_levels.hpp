@@ -10,6 +10,9 @@
 
 namespace modar {
 
+/// See LevelOptions. Measuring so many takes 0.15 CPU-s.
+inline constexpr std::size_t kMeasuredTriangles = 50'000;
+
 struct LevelOptions {
   std::uint32_t levels = 4;  ///< greatest number a chunk, the finest counted; 1 to kMaxLevels
   PositionKind positions = PositionKind::kHalf;  ///< whose decoded positions the errors are of
@@ -17,6 +20,10 @@ struct LevelOptions {
   /// A level of more triangles than this is a quarter of the level before it, not a half: no phone
   /// draws a million, and each level takes bytes and has to be measured.
   std::size_t many_triangles = 1'000'000;
+  /// The distances of levels of larger models are told by the ways of their vertices, where the
+  /// shading shows far more: the bound holds, but is loose. Measuring those of a scan of 0.9
+  /// million triangles takes a quarter of its bake.
+  std::size_t measured_triangles = kMeasuredTriangles;
   /// Coarser levels are none of the chunks' (see plan_stand_ins()).
   std::uint32_t most_halvings = 0xFFFFFFFFu;
   /// Pixels of each material's texture along a side, 0 where it has none; may be empty.
@@ -42,9 +49,10 @@ std::vector<std::uint32_t> halvings_of(std::size_t triangles, const LevelOptions
 /// most do (flat shading): corners of coarser triangles take the normal that is nearest to the
 /// triangle's. A level's error bounds the distance between it and level 0, both as the device
 /// decodes them, measured from either to the other (see level_distance()), for coarse levels by way
-/// of a finer one that is hardly off; beside it stands what its normals, its colours and its
-/// texture show (see PixelCells), which is far more. Where vertices of level 0 are gone, the
-/// texture has slid by no more than 1 % of the chunk's diagonal. Figures go to report.levels.
+/// of a finer one that is hardly off, or told by the ways of vertices (see measured_triangles);
+/// beside it stands what its normals, its colours and its texture show (see PixelCells), which is
+/// far more. Where vertices of level 0 are gone, the texture has slid by no more than 1 % of the
+/// chunk's diagonal. Figures go to report.levels.
 Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report& report);
 
 /// Takes out the levels that are hardly nearer to the finest than the next coarser one is.
@@ -71,6 +79,7 @@ StandInPlan plan_stand_ins(const ChunkedMesh& mesh, const LevelOptions& options)
 struct StandInOptions {
   StandInPlan plan;
   PositionKind positions = PositionKind::kHalf;  ///< whose decoded positions the errors are of
+  std::size_t measured_triangles = kMeasuredTriangles;  ///< as LevelOptions'
 };
 
 /// Makes the stand-ins of a mesh whose chunks have their levels, the finest first, each with half

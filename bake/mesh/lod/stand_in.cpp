@@ -12,6 +12,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "bake/mesh/lod/collapse_bound.hpp"
 #include "bake/mesh/lod/mesh_collapse.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/mesh/lod/pixel_cells.hpp"
@@ -58,6 +59,7 @@ struct Joined {
   Measured surface;
   std::vector<std::uint32_t> vertices;   ///< of the mesh, by vertex of the surface
   std::vector<std::uint32_t> materials;  ///< by triangle
+  std::vector<std::uint32_t> faces;      ///< by triangle: of the collapser, kNoIndex: none
   double shading = 0;
 };
 
@@ -199,7 +201,9 @@ CollapseMesh collapse_mesh(const TriMesh& mesh, Joined& joined) {
       face.shades[k] = at.shade;
     }
     const auto& p = face.places;
-    if (p[0] != p[1] && p[1] != p[2] && p[2] != p[0]) out.faces.push_back(face);
+    const bool has_area = p[0] != p[1] && p[1] != p[2] && p[2] != p[0];
+    joined.faces.push_back(has_area ? static_cast<std::uint32_t>(out.faces.size()) : kNoIndex);
+    if (has_area) out.faces.push_back(face);
   }
   return out;
 }
@@ -266,12 +270,14 @@ class TrianglesAt {
   std::vector<std::uint32_t> triangles_;
 };
 
-/// Of each vertex of a surface, a triangle of another one near it: within `enough`, or the nearest
-/// around.
-std::vector<std::uint32_t> near_triangles(const Measured& from, const MeshSurface& to,
-                                          const TrianglesAt& at, double enough) {
+/// Of each vertex of some triangles of a surface, a triangle of another one near it: within
+/// `enough`, or the nearest around. indices: of the triangles' corners.
+std::vector<std::uint32_t> near_triangles(const Measured& from,
+                                          std::span<const std::uint32_t> indices,
+                                          const MeshSurface& to, const TrianglesAt& at,
+                                          double enough) {
   std::vector<std::uint32_t> near(from.positions.size(), kNoIndex);
-  for (const std::uint32_t v : from.indices) {
+  for (const std::uint32_t v : indices) {
     if (near[v] != kNoIndex) continue;
     const std::uint32_t start = at[from.places[v]];
     if (start == kNoIndex) continue;
@@ -287,9 +293,10 @@ std::vector<std::uint32_t> near_triangles(const Measured& from, const MeshSurfac
 double distance_both_ways(Measured& fine, const TrianglesAt& at_fine, Measured& coarse,
                           const TrianglesAt& at_coarse, double least) {
   const std::vector<std::uint32_t> there =
-      near_triangles(fine, *coarse.triangles, at_coarse, least);
+      near_triangles(fine, fine.indices, *coarse.triangles, at_coarse, least);
   const double found = surface_distance(*fine.triangles, *coarse.triangles, there, least);
-  const std::vector<std::uint32_t> back = near_triangles(coarse, *fine.triangles, at_fine, least);
+  const std::vector<std::uint32_t> back =
+      near_triangles(coarse, coarse.indices, *fine.triangles, at_fine, least);
   return surface_distance(*coarse.triangles, *fine.triangles, back, found);
 }
 
@@ -395,22 +402,72 @@ class StandInMaker {
     out.mesh.repeats = mesh_.repeats;
     Measured surface = decoded_surface(out.mesh, options_.positions, places);
     const TrianglesAt at(surface, collapser_, places_);
-    const double least = measured_.empty() ? joined_.surface.error : measured_.back().error;
-    const auto exact = [&](const Measured& other) { return other.error <= kNegligible * least; };
-    const auto from = std::find_if(measured_.rbegin(), measured_.rend(), exact);
-    Measured& fine = from != measured_.rend() ? *from : joined_.surface;
-    const double distance = distance_both_ways(fine, TrianglesAt(fine, collapser_, places_),
-                                               surface, at, std::max(0.0, least - fine.error));
-    surface.error = out.error = std::max(least, fine.error + distance);
     out.shading = std::max(joined_.shading, shading_of(*surface.triangles, at, out.mesh.mesh));
-    // No coarser one is measured against those before.
-    measured_.erase(measured_.begin(), from.base() - (from != measured_.rend() ? 1 : 0));
+    surface.error = out.error = error_of(surface, at, out.shading);
     measured_.push_back(std::move(surface));
     collapser_.forget();
     return true;
   }
 
  private:
+  /// Of a new stand-in from level 0: by the collapses from the joined levels where they tell enough
+  /// beside the shading, or measured.
+  double error_of(Measured& surface, const TrianglesAt& at, double shading) {
+    const double least = measured_.empty() ? joined_.surface.error : measured_.back().error;
+    const double hidden = triangles_in(mesh_) > options_.measured_triangles ? kHidden : 0.0;
+    const double enough = std::max(least, hidden * shading) - joined_.surface.error;
+    const CollapseBound bound = settled_by_collapses(surface, at, enough);
+    if (bound.open.empty()) return std::max(least, joined_.surface.error + bound.moved);
+    const auto stays = [&](std::uint32_t t) {
+      return joined_.faces[t] != kNoIndex && collapser_.has(joined_.faces[t]);
+    };
+    if (std::none_of(bound.open.begin(), bound.open.end(), stays)) {
+      // All of the stand-in is near the joined levels.
+      std::vector<std::uint32_t> corners;
+      for (const std::uint32_t t : bound.open) {
+        const std::uint32_t* i = joined_.surface.triangles->corners(t);
+        corners.insert(corners.end(), i, i + 3);
+      }
+      const double settled = std::max(least - joined_.surface.error, bound.moved);
+      return joined_.surface.error +
+             surface_distance(
+                 *joined_.surface.triangles, *surface.triangles,
+                 near_triangles(joined_.surface, corners, *surface.triangles, at, settled), settled,
+                 0, bound.settled);
+    }
+    const auto exact = [&](const Measured& other) { return other.error <= kNegligible * least; };
+    const auto from = std::find_if(measured_.rbegin(), measured_.rend(), exact);
+    Measured& fine = from != measured_.rend() ? *from : joined_.surface;
+    const double distance = distance_both_ways(fine, TrianglesAt(fine, collapser_, places_),
+                                               surface, at, std::max(0.0, least - fine.error));
+    // No coarser one is measured against those before.
+    measured_.erase(measured_.begin(), from.base() - (from != measured_.rend() ? 1 : 0));
+    return std::max(least, fine.error + distance);
+  }
+
+  /// What the collapses tell of the distance of a stand-in from the joined levels.
+  CollapseBound settled_by_collapses(const Measured& surface, const TrianglesAt& at, double most) {
+    // Vertices at one place may be decoded apart where chunks meet.
+    std::vector<glm::dvec3> points(places_);
+    std::vector<std::uint8_t> known(places_, 0);
+    double apart = 0;
+    for (std::size_t v = 0; v < surface.positions.size(); ++v) {
+      const std::uint32_t place = surface.places[v];
+      if (std::exchange(known[place], std::uint8_t{1}) == 0) points[place] = surface.positions[v];
+      apart = std::max(apart, glm::length(surface.positions[v] - points[place]));
+    }
+    std::vector<double> moved(joined_.surface.positions.size());
+    for (std::size_t v = 0; v < moved.size(); ++v) {
+      const std::uint32_t place = collapser_.place_of(joined_.surface.places[v]);
+      const double way = glm::length(joined_.surface.positions[v] - points[place]) + apart;
+      moved[v] = at[place] == kNoIndex ? std::numeric_limits<double>::infinity() : way * way;
+    }
+    const auto lands = [&](std::uint32_t t) {
+      return joined_.faces[t] != kNoIndex && collapser_.has(joined_.faces[t]);
+    };
+    return collapse_bound(*joined_.surface.triangles, std::span<const double>(moved), lands, most);
+  }
+
   /// As ChunkLevel::shading. mesh: what the surface is of.
   double shading_of(const MeshSurface& surface, const TrianglesAt& at, const TriMesh& mesh) {
     std::vector<LookDifference> differences(points_.middles.size());
@@ -418,7 +475,7 @@ class StandInMaker {
       const std::size_t corner = 3 * std::size_t{points_.triangles[i]};
       const std::uint32_t start = at[joined_.surface.places[joined_.surface.indices[corner]]];
       if (start == kNoIndex) continue;
-      const std::uint32_t t = surface.nearest_around(points_.middles[i], start).triangle;
+      const std::uint32_t t = surface.walk(points_.middles[i], start);
       const ClosestPoint closest = closest_point(points_.middles[i], surface.triangle(t));
       const std::uint32_t* c = surface.corners(t);
       const Look there = look_at(mesh, {c[0], c[1], c[2]}, closest.b, closest.c);
