@@ -218,6 +218,15 @@ class Decimator {
 
  private:
   using Triangle = std::array<std::uint16_t, 3>;
+  /// Of a triangle: the vertex' next one, and the two vertices that follow it, which are equal
+  /// where the triangle is gone.
+  struct Corner {
+    std::uint32_t next = kNoIndex;
+    std::uint16_t a = 0;
+    std::uint16_t b = 0;
+    [[nodiscard]] bool is_gone() const { return a == b; }
+    void leave() { a = b; }
+  };
   /// Inside the surface, on a rim of it, or to be kept.
   enum class Kind : std::uint8_t { kInside, kRim, kLocked };
   /// Of a vertex: the collapse to try next; to itself where none is legal.
@@ -248,38 +257,34 @@ class Decimator {
     for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
       const Triangle t = {indices[i], indices[i + 1], indices[i + 2]};
       if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
-      const auto first_corner = static_cast<std::uint32_t>(3 * triangles_.size());
-      triangles_.push_back(t);
+      const auto first_corner = static_cast<std::uint32_t>(corners_.size());
       const glm::dvec3& origin = position(t[0]);
       const glm::dvec3 cross = glm::cross(position(t[1]) - origin, position(t[2]) - origin);
       const double twice = glm::length(cross);
       Quadric plane;
       if (twice > 0) plane = Quadric::of_plane(cross / twice, origin, 0.5 * twice);
       for (std::uint32_t k = 0; k < 3; ++k) {
-        next_.push_back(first_[t[k]]);
+        corners_.push_back({first_[t[k]], t[(k + 1) % 3], t[(k + 2) % 3]});
         first_[t[k]] = first_corner + k;
         quadrics_[t[k]] += plane;
       }
     }
-    alive_.assign(triangles_.size(), 1);
-    alive_count_ = triangles_.size();
+    alive_count_ = corners_.size() / 3;
   }
 
-  /// Calls back with the number of each triangle at v and the two vertices that follow v in it.
+  /// Calls back with the corner of each triangle at v and the two vertices that follow v in it.
   template <typename Callback>
   void around(std::uint16_t v, const Callback& callback) {
     std::uint32_t* link = &first_[v];
     while (*link != kNoIndex) {
-      const std::uint32_t corner = *link;
-      const std::uint32_t t = corner / 3;
-      if (alive_[t] == 0) {
-        *link = next_[corner];
+      const std::uint32_t number = *link;
+      Corner& corner = corners_[number];
+      if (corner.is_gone()) {
+        *link = corner.next;
         continue;
       }
-      const Triangle& triangle = triangles_[t];
-      const std::array<std::uint32_t, 2>& others = kOtherCorners[corner - 3 * t];
-      callback(t, triangle[others[0]], triangle[others[1]]);
-      link = &next_[corner];
+      callback(number, corner.a, corner.b);
+      link = &corner.next;
     }
   }
 
@@ -488,8 +493,8 @@ class Decimator {
   /// Lists the triangles that stay, as they are after the collapse.
   void collect(std::uint16_t v, std::uint16_t u) {
     kept_.clear();
-    around(v, [&](std::uint32_t t, std::uint16_t a, std::uint16_t b) {
-      if (a != u && b != u) kept_.push_back({t, {u, a, b}});
+    around(v, [&](std::uint32_t corner, std::uint16_t a, std::uint16_t b) {
+      if (a != u && b != u) kept_.push_back({corner / 3, {u, a, b}});
     });
   }
 
@@ -497,14 +502,14 @@ class Decimator {
   /// bound on it where that is allowed: that of v, beside what its triangles are off by.
   double shift_after(std::uint16_t v, std::uint16_t u) {
     double before = 0;
-    around(v, [&](std::uint32_t t, std::uint16_t, std::uint16_t) {
-      before = std::max(before, removed_.uv_shift(t));
+    around(v, [&](std::uint32_t corner, std::uint16_t, std::uint16_t) {
+      before = std::max(before, removed_.uv_shift(corner / 3));
     });
     collect(v, u);
     double shift = uv_shift_of(vertices_, v, kept_);
     if (before + shift <= limits_.max_uv_shift) return before + shift;
-    around(v, [&](std::uint32_t t, std::uint16_t, std::uint16_t) {
-      shift = std::max(shift, removed_.uv_shift_on(t, kept_));
+    around(v, [&](std::uint32_t corner, std::uint16_t, std::uint16_t) {
+      shift = std::max(shift, removed_.uv_shift_on(corner / 3, kept_));
     });
     return shift;
   }
@@ -514,22 +519,25 @@ class Decimator {
     removed_.detach_vertex(v);
     if (!vertices_.uvs.empty()) collect(v, u);
     ring_.clear();
-    around(v, [&](std::uint32_t t, std::uint16_t a, std::uint16_t b) {
+    std::uint32_t last = kNoIndex;
+    around(v, [&](std::uint32_t corner, std::uint16_t a, std::uint16_t b) {
+      const std::uint32_t t = corner / 3;
       removed_.detach_triangle(t);
       ring_.push_back(a);
       ring_.push_back(b);
-      if (a != u && b != u) return;
-      alive_[t] = 0;
-      --alive_count_;
-    });
-    // What is left in the list of v are the triangles that stay: they become those of u.
-    std::uint32_t last = kNoIndex;
-    for (std::uint32_t corner = first_[v]; corner != kNoIndex; corner = next_[corner]) {
-      triangles_[corner / 3][corner % 3] = u;
+      if (a == u || b == u) {
+        for (std::uint32_t k = 0; k < 3; ++k) corners_[3 * t + k].leave();
+        --alive_count_;
+        return;
+      }
+      // It becomes one of u.
+      const std::array<std::uint32_t, 2>& others = kOtherCorners[corner - 3 * t];
+      corners_[3 * t + others[0]].b = u;
+      corners_[3 * t + others[1]].a = u;
       last = corner;
-    }
+    });
     if (last != kNoIndex) {
-      next_[last] = first_[u];
+      corners_[last].next = first_[u];
       first_[u] = first_[v];
     }
     first_[v] = kNoIndex;
@@ -576,11 +584,9 @@ class Decimator {
 
   ChunkVertices vertices_;
   DecimateLimits limits_;
-  std::vector<Triangle> triangles_;
-  std::vector<std::uint8_t> alive_;  // of each triangle
+  std::vector<Corner> corners_;  // three a triangle
   std::size_t alive_count_ = 0;
   std::vector<std::uint32_t> first_;  // of each vertex: its first corner
-  std::vector<std::uint32_t> next_;   // of each corner: the vertex' next one
   std::vector<Kind> kinds_;
   std::vector<Quadric> quadrics_;
   std::vector<double> own_;  // of each vertex: its quadric there

@@ -38,6 +38,7 @@ std::uint32_t root_of(std::vector<std::pair<std::uint32_t, std::uint32_t>>& join
 MeshCollapser::MeshCollapser(CollapseMesh mesh)
     : mesh_(std::move(mesh)),
       alive_(mesh_.faces.size(), 1),
+      left_(mesh_.faces.size()),
       alive_count_(mesh_.faces.size()),
       first_(mesh_.places.size(), kNoIndex),
       quadrics_(mesh_.places.size()),
@@ -47,8 +48,12 @@ MeshCollapser::MeshCollapser(CollapseMesh mesh)
       several_(mesh_.places.size(), 0),
       marks_(mesh_.places.size(), 0) {
   std::iota(parents_.begin(), parents_.end(), 0u);
+  std::iota(left_.begin(), left_.end(), 0u);
   link_faces();
-  forget();
+  for (std::uint32_t place = 0; place < borders_.size(); ++place) {
+    borders_[place] = is_open(place) ? 1 : 0;
+  }
+  price_faces();
 }
 
 void MeshCollapser::link_faces() {
@@ -65,22 +70,31 @@ void MeshCollapser::link_faces() {
 }
 
 void MeshCollapser::forget() {
-  queue_ = {};
-  std::fill(quadrics_.begin(), quadrics_.end(), Quadric());
-  std::vector<std::uint8_t> open(mesh_.places.size());
-  for (std::uint32_t place = 0; place < open.size(); ++place) open[place] = is_open(place) ? 1 : 0;
-  for (std::uint32_t f = 0; f < mesh_.faces.size(); ++f) {
-    if (alive_[f] == 0) continue;
+  queue_.clear();
+  std::erase_if(left_, [&](std::uint32_t f) { return alive_[f] == 0; });
+  // Collapses make no border where there was none.
+  for (const std::uint32_t f : left_) {
+    for (const std::uint32_t place : mesh_.faces[f].places) {
+      quadrics_[place] = {};
+      if (borders_[place] != 0) borders_[place] = is_open(place) ? 1 : 0;
+    }
+  }
+  price_faces();
+}
+
+/// Sums up the quadrics of what is left.
+void MeshCollapser::price_faces() {
+  for (const std::uint32_t f : left_) {
     const std::array<glm::dvec3, 3> t = corners_of(mesh_, mesh_.faces[f]);
     const glm::dvec3 cross = glm::cross(t[1] - t[0], t[2] - t[0]);
     const double twice = glm::length(cross);
+    const std::array<std::uint32_t, 3>& at = mesh_.faces[f].places;
     if (twice > 0) {
       const Quadric plane = Quadric::of_plane(cross / twice, t[0], 0.5 * twice);
-      for (const std::uint32_t place : mesh_.faces[f].places) quadrics_[place] += plane;
+      for (const std::uint32_t place : at) quadrics_[place] += plane;
     }
-    const std::array<std::uint32_t, 3>& at = mesh_.faces[f].places;
     for (std::uint32_t k = 0; k < 3; ++k) {
-      if (open[at[k]] != 0 && open[at[(k + 1) % 3]] != 0) add_border(f, k);
+      if (borders_[at[k]] != 0 && borders_[at[(k + 1) % 3]] != 0) add_border(f, k);
     }
   }
 }
@@ -109,7 +123,6 @@ void MeshCollapser::add_border(std::uint32_t f, std::uint32_t k) {
   std::size_t count = 0;
   around(v, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) { count += a == w || b == w; });
   if (count != 1) return;
-  borders_[v] = borders_[w] = 1;
   const glm::dvec3 edge = mesh_.places[w] - mesh_.places[v];
   const glm::dvec3 third = mesh_.places[at[(k + 2) % 3]] - mesh_.places[v];
   const glm::dvec3 across = glm::cross(glm::cross(edge, third), edge);
@@ -162,11 +175,10 @@ bool MeshCollapser::reduce_to(std::size_t triangles) {
       // What was not legal before may be so now.
       if (!collapsed) return false;
       collapsed = false;
-      fill_queue();
+      fill_queue(alive_count_ - triangles);
       continue;
     }
-    const Candidate best = queue_.top();
-    queue_.pop();
+    const Candidate best = queue_.take();
     if (best.to_version != versions_[best.to] || best.from_version != versions_[best.from]) {
       continue;
     }
@@ -187,24 +199,28 @@ bool MeshCollapser::reduce_to(std::size_t triangles) {
   return true;
 }
 
-void MeshCollapser::fill_queue() {
-  for (std::uint32_t f = 0; f < mesh_.faces.size(); ++f) {
+/// collapses: about so many are to come.
+void MeshCollapser::fill_queue(std::size_t collapses) {
+  std::vector<Candidate> all;
+  all.reserve(2 * alive_count_);
+  for (const std::uint32_t f : left_) {
     if (alive_[f] == 0) continue;
     const auto at = mesh_.faces[f].places;
     // From one of its two triangles; at a border and where they are turned, from any.
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t a = at[k];
       const std::uint32_t b = at[(k + 1) % 3];
-      if (a < b || (borders_[a] != 0 && borders_[b] != 0)) push(a, b);
+      if (a < b || (borders_[a] != 0 && borders_[b] != 0)) all.push_back(candidate(a, b));
     }
   }
+  queue_.fill(std::move(all), collapses);
 }
 
-void MeshCollapser::push(std::uint32_t a, std::uint32_t b) {
+MeshCollapser::Candidate MeshCollapser::candidate(std::uint32_t a, std::uint32_t b) {
   const std::uint32_t to = std::min(a, b);
   const std::uint32_t from = std::max(a, b);
   const auto price = static_cast<float>(target_of(to, from).price);
-  queue_.push({price, to, from, versions_[to], versions_[from]});
+  return {price, to, from, versions_[to], versions_[from]};
 }
 
 void MeshCollapser::push_around(std::uint32_t place) {
@@ -215,7 +231,7 @@ void MeshCollapser::push_around(std::uint32_t place) {
       if (std::exchange(marks_[other], mark_) != mark_) ring_.push_back(other);
     }
   });
-  for (const std::uint32_t other : ring_) push(place, other);
+  for (const std::uint32_t other : ring_) queue_.push(candidate(place, other));
 }
 
 bool MeshCollapser::has_several_looks(std::uint32_t place) {

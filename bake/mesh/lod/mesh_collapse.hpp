@@ -1,11 +1,12 @@
 // Collapses the edges of a whole mesh, chunks and seams or not. Internal to lod.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <queue>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -45,6 +46,62 @@ struct CollapseMesh {
   std::vector<CornerLook> looks;
   std::vector<CornerShade> shades;
   std::vector<CollapseFace> faces;
+};
+
+/// Candidates of collapses, cheapest first. The dearer ones wait aside, without an order, until the
+/// others are used up: most are never asked for.
+template <class Candidate>
+class CollapseQueue {
+ public:
+  /// Starts again with all of these, of which about so many will be taken.
+  void fill(std::vector<Candidate> all, std::size_t taken) {
+    aside_ = std::move(all);
+    heap_.clear();
+    draw(taken);
+  }
+  [[nodiscard]] bool empty() const { return heap_.empty() && aside_.empty(); }
+  void clear() {
+    heap_.clear();
+    aside_.clear();
+    most_ = std::numeric_limits<float>::infinity();
+  }
+  void push(const Candidate& candidate) {
+    if (candidate.price > most_) {
+      aside_.push_back(candidate);
+      return;
+    }
+    heap_.push_back(candidate);
+    std::push_heap(heap_.begin(), heap_.end());
+  }
+  /// Takes the cheapest of those that there are.
+  Candidate take() {
+    if (heap_.empty()) draw(aside_.size() / 4);
+    std::pop_heap(heap_.begin(), heap_.end());
+    const Candidate best = heap_.back();
+    heap_.pop_back();
+    return best;
+  }
+
+ private:
+  /// Orders so many of those aside, and all of the price of the last of them.
+  void draw(std::size_t count) {
+    most_ = std::numeric_limits<float>::infinity();
+    const auto dearer = [](const Candidate& a, const Candidate& b) { return a.price < b.price; };
+    if (count < aside_.size()) {
+      const auto last = aside_.begin() + static_cast<std::ptrdiff_t>(count);
+      std::nth_element(aside_.begin(), last, aside_.end(), dearer);
+      most_ = last->price;
+    }
+    const auto stay = std::partition(aside_.begin(), aside_.end(),
+                                     [&](const Candidate& c) { return c.price > most_; });
+    heap_.assign(stay, aside_.end());
+    aside_.erase(stay, aside_.end());
+    std::make_heap(heap_.begin(), heap_.end());
+  }
+
+  std::vector<Candidate> heap_;
+  std::vector<Candidate> aside_;
+  float most_ = std::numeric_limits<float>::infinity();  ///< price of those in the heap
 };
 
 /// Edge collapses, cheapest first, each to the point where the quadrics of its two ends are least.
@@ -99,10 +156,11 @@ class MeshCollapser {
   template <class Callback>
   void around(std::uint32_t place, const Callback& callback);
   void link_faces();
+  void price_faces();
   bool is_open(std::uint32_t place);
   void add_border(std::uint32_t f, std::uint32_t k);
-  void fill_queue();
-  void push(std::uint32_t a, std::uint32_t b);
+  void fill_queue(std::size_t collapses);
+  [[nodiscard]] Candidate candidate(std::uint32_t a, std::uint32_t b);
   void push_around(std::uint32_t place);
   [[nodiscard]] Target target_of(std::uint32_t a, std::uint32_t b);
   double slide_at(const glm::dvec3& point);
@@ -129,6 +187,7 @@ class MeshCollapser {
 
   CollapseMesh mesh_;
   std::vector<std::uint8_t> alive_;  // of each face
+  std::vector<std::uint32_t> left_;  // faces, in order; some of them may be gone
   std::size_t alive_count_ = 0;
   std::vector<std::uint32_t> first_;   // of each place: its first corner
   std::vector<std::uint32_t> next_;    // of each corner: the place's next one
@@ -139,7 +198,7 @@ class MeshCollapser {
   std::vector<std::uint8_t> several_;   // of each place: 1 where it has several looks
   std::vector<std::uint32_t> marks_;
   std::uint32_t mark_ = 0;
-  std::priority_queue<Candidate> queue_;
+  CollapseQueue<Candidate> queue_;
   std::vector<NearFace> near_;
   Joined looks_;
   Joined shades_;
