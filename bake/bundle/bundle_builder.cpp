@@ -338,7 +338,7 @@ Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& 
   level_options.jobs = request.jobs;
   level_options.texture_sides = texture_sides;
   const StandInPlan stand_ins = plan_stand_ins(*chunked, level_options);
-  if (stand_ins.count > 0) level_options.most_halvings = stand_ins.first_halving - 1;
+  if (!stand_ins.halvings.empty()) level_options.most_halvings = stand_ins.halvings[0] - 1;
   if (auto made = make_levels(*chunked, level_options, report); !made) {
     return tl::unexpected(made.error());
   }

@@ -38,7 +38,8 @@ Made made(const std::string& obj, std::uint32_t max_vertices,
   options.positions = kind;
   options.measured_triangles = measured;
   out.plan = plan_stand_ins(out.mesh, options);
-  options.most_halvings = out.plan.first_halving - 1;
+  EXPECT_FALSE(out.plan.halvings.empty());
+  options.most_halvings = out.plan.halvings.empty() ? 0 : out.plan.halvings[0] - 1;
   Report report;
   EXPECT_TRUE(make_levels(out.mesh, options, report));
   auto all = make_stand_ins(out.mesh, {out.plan, kind, measured}, report);
@@ -97,7 +98,7 @@ TEST(StandIns, HalveDownToAThousandInOneChunkWithinTheirBounds) {
         std::pair(kFloat, kMeasuredTriangles), std::pair(kInt16, std::size_t{0})}) {
     const Made sheet = made(grid(100, 1), 1500, kind, measured);
     ASSERT_GT(sheet.mesh.chunks.size(), 6u);
-    EXPECT_EQ(sheet.plan.first_halving, 3u);
+    EXPECT_EQ(sheet.plan.halvings, (std::vector<std::uint32_t>{3, 4}));
     ASSERT_EQ(sheet.stand_ins.size(), 2u);  // 2500 and 1250 of 20,000
     const Surface fine = decoded(sheet.mesh, kind);
     double before = 0;
@@ -206,15 +207,18 @@ TEST(StandIns, AreNoneOfOneChunkOrOfFewTriangles) {
   LevelOptions options;
   options.levels = kMaxLevels;
   const auto planned = [&](int n, std::uint32_t vertices) {
-    return plan_stand_ins(chunked(welded(parse(grid(n, 1))), vertices), options).count;
+    return plan_stand_ins(chunked(welded(parse(grid(n, 1))), vertices), options).halvings;
   };
-  EXPECT_EQ(planned(100, 65535), 0u);
-  EXPECT_EQ(planned(60, 1500), 0u);  // an eighth of 7200 are 900
-  EXPECT_EQ(planned(100, 1500), 2u);
+  using Halvings = std::vector<std::uint32_t>;
+  EXPECT_EQ(planned(100, 65535), Halvings());
+  EXPECT_EQ(planned(60, 1500), Halvings());  // an eighth of 7200 are 900
+  EXPECT_EQ(planned(100, 1500), (Halvings{3, 4}));
+  // A quarter of 10,000, and the least of 80,000 halved that is above 1000.
+  EXPECT_EQ(planned(200, 1500), (Halvings{3, 5, 6}));
   options.levels = 4;
-  EXPECT_EQ(planned(100, 1500), 1u);
+  EXPECT_EQ(planned(100, 1500), Halvings{3});
   options.levels = 3;
-  EXPECT_EQ(planned(100, 1500), 0u);
+  EXPECT_EQ(planned(100, 1500), Halvings());
 }
 
 }  // namespace

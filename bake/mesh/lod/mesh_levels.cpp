@@ -52,7 +52,7 @@ constexpr float kSteepest = 8;
 constexpr float kLeastPrice = static_cast<float>(kDistanceFloor * kDistanceFloor);
 /// Halvings of a chunk beyond the coarsest level: the model's triangles are shared out by need, and
 /// a flat chunk may lose more than its share. Swept on scans: flat from 1 to 4.
-constexpr std::uint32_t kFurther = 2;
+constexpr std::uint32_t kFurther = 1;
 /// Chunks of more triangles are looked at in every other one only. Swept on scans: flat from 2,500
 /// to 40,000.
 constexpr std::size_t kFewLooks = 10'000;

@@ -65,11 +65,10 @@ struct StandIn {
   double shading = 0;  ///< as ChunkLevel's
 };
 
-/// Which levels of a mesh are stand-ins: the chunks have those before.
+/// Which levels of a mesh are stand-ins: how often its triangles are halved at each, none: chunks
+/// have all levels, else those before.
 struct StandInPlan {
-  /// Of the mesh's triangles, at the first one; 0: there is none, chunks have all levels.
-  std::uint32_t first_halving = 0;
-  std::uint32_t count = 0;
+  std::vector<std::uint32_t> halvings;
 };
 
 /// Meshes of one chunk have borders that nothing else meets, small ones need no coarser levels.
@@ -82,10 +81,10 @@ struct StandInOptions {
   std::size_t measured_triangles = kMeasuredTriangles;  ///< as LevelOptions'
 };
 
-/// Makes the stand-ins of a mesh whose chunks have their levels, the finest first, each with half
-/// of the triangles of the one before. Borders of chunks mean nothing to them, those of materials
-/// and uv islands are kept as long as anything else costs less. Fewer than planned where a mesh is
-/// in too many pieces. Vertices carry the normals, uvs, colours and occlusion of level 0.
+/// Makes the stand-ins of a mesh whose chunks have their levels, the finest first. Borders of
+/// chunks mean nothing to them, those of materials and uv islands are kept as long as anything else
+/// costs less. Fewer than planned where a mesh is in too many pieces. Vertices carry the normals,
+/// uvs, colours and occlusion of level 0.
 Result<std::vector<StandIn>> make_stand_ins(const ChunkedMesh& mesh, const StandInOptions& options,
                                             Report& report);
 
