@@ -520,16 +520,17 @@ TEST(Levels, WaysOfVerticesBoundDistances) {
   const std::vector<glm::dvec3> p = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                      {5, 0, 0}, {6, 0, 0}, {5, 1, 0}};
   const std::vector<std::uint16_t> indices = {0, 1, 2, 0, 2, 3, 4, 5, 6};
-  const LevelSurface square(p, indices);
   const double gone = std::numeric_limits<double>::infinity();
   const std::vector<double> moved = {0, 0.01, 0, 0, gone, gone, gone};
   const auto lands = [](std::uint32_t t) { return t == 0; };
-  const CollapseBound wide = collapse_bound(square, std::span(moved), lands, 1.0);
+  const CollapseBound wide =
+      collapse_bound(std::span(p), std::span(indices), std::span(moved), lands, 1.0);
   EXPECT_EQ(wide.settled, (std::vector<std::uint8_t>{1, 1, 0}));
   EXPECT_EQ(wide.open, std::vector<std::uint32_t>{2});
   // The centre of an equilateral triangle is the farthest from all corners.
   EXPECT_NEAR(wide.moved, std::sqrt(2.0 / 3), 1e-9);
-  const CollapseBound narrow = collapse_bound(square, std::span(moved), lands, 0.5);
+  const CollapseBound narrow =
+      collapse_bound(std::span(p), std::span(indices), std::span(moved), lands, 0.5);
   EXPECT_EQ(narrow.settled, (std::vector<std::uint8_t>{1, 0, 0}));
   EXPECT_NEAR(narrow.moved, 0.1, 1e-9);
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -10,8 +9,6 @@
 
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
-
-#include "bake/mesh/lod/level_surface.hpp"
 
 namespace modar {
 
@@ -32,23 +29,22 @@ struct CollapseBound {
 /// Collapses map a level onto the coarser one: a triangle onto one of its triangles, edges or
 /// vertices, so that no point of either is farther from the other's than corners are from what they
 /// have become. moved: of each vertex, the square of that distance, infinite where it has become no
-/// part of the coarser level. lands: is what a triangle of the finer level has become part of the
-/// coarser? Where it is not, the triangle's points are within the longest side over the root of
-/// three of some corner. most: the limit.
+/// part of the coarser level. fine: triangles of the finer one. lands: is what a triangle of the
+/// finer level has become part of the coarser? Where it is not, the triangle's points are within
+/// the longest side over the root of three of some corner. most: the limit.
 template <class Index, class Lands>
-CollapseBound collapse_bound(const BasicLevelSurface<Index>& fine, std::span<const double> moved,
-                             const Lands& lands, double most) {
+CollapseBound collapse_bound(std::span<const glm::dvec3> positions, std::span<const Index> fine,
+                             std::span<const double> moved, const Lands& lands, double most) {
   CollapseBound bound;
-  bound.settled.assign(fine.triangles(), 1);
+  bound.settled.assign(fine.size() / 3, 1);
   double greatest = 0;  // square
-  for (std::uint32_t t = 0; t < fine.triangles(); ++t) {
-    const Index* v = fine.corners(t);
+  for (std::uint32_t t = 0; t < bound.settled.size(); ++t) {
+    const Index* v = &fine[3 * std::size_t{t}];
     double square = std::max({moved[v[0]], moved[v[1]], moved[v[2]]});
     if (square <= most * most && !lands(t)) {
-      const std::array<glm::dvec3, 3> p = fine.triangle(t);
       double longest = 0;
       for (std::size_t k = 0; k < 3; ++k) {
-        const glm::dvec3 side = p[(k + 1) % 3] - p[k];
+        const glm::dvec3 side = positions[v[(k + 1) % 3]] - positions[v[k]];
         longest = std::max(longest, glm::dot(side, side));
       }
       const double sum = std::sqrt(square) + std::sqrt(longest / 3);

@@ -365,54 +365,68 @@ std::vector<std::uint16_t> collapsed_triangles(std::span<const std::uint16_t> in
   return result;
 }
 
-/// A level of a chunk, and how far it is from the finest.
-struct MeasuredLevel {
+/// A level of a chunk, and how far it is from the finest. Which triangles are adjacent is looked up
+/// once it is asked for: of the finest level it mostly never is.
+class MeasuredLevel {
+ public:
   MeasuredLevel(std::span<const glm::dvec3> positions, std::vector<std::uint16_t> triangles)
-      : indices(std::move(triangles)),
-        surface(positions, indices),
-        of_vertices(surface.triangles_of_vertices()) {}
+      : indices(std::move(triangles)), positions_(positions) {}
+
+  [[nodiscard]] std::size_t triangles() const { return indices.size() / 3; }
+  LevelSurface& surface() {
+    if (!surface_) surface_.emplace(positions_, indices);
+    return *surface_;
+  }
+  /// Of each vertex a triangle whose corner it is, kNoIndex where there is none.
+  const std::vector<std::uint32_t>& of_vertices() {
+    if (of_vertices_.empty()) of_vertices_ = surface().triangles_of_vertices();
+    return of_vertices_;
+  }
 
   std::vector<std::uint16_t> indices;
-  LevelSurface surface;  ///< of the indices
-  std::vector<std::uint32_t> of_vertices;
   double error = 0;
+
+ private:
+  std::span<const glm::dvec3> positions_;
+  std::optional<LevelSurface> surface_;  ///< of the indices
+  std::vector<std::uint32_t> of_vertices_;
 };
 
 /// Of each vertex of some triangles of a finer level, a triangle of a level near it.
-std::vector<std::uint32_t> near_vertices(const MeasuredLevel& level,
-                                         std::span<const std::uint16_t> finer,
+std::vector<std::uint32_t> near_vertices(MeasuredLevel& level, std::span<const std::uint16_t> finer,
                                          std::span<const glm::dvec3> positions,
                                          const std::vector<std::uint16_t>& become) {
-  std::vector<std::uint32_t> nearby = level.of_vertices;
+  std::vector<std::uint32_t> nearby = level.of_vertices();
   for (const std::uint16_t v : finer) {
     if (nearby[v] != kNoIndex || nearby[become[v]] == kNoIndex) continue;
-    nearby[v] = level.surface.walk(positions[v], nearby[become[v]]);
+    nearby[v] = level.surface().walk(positions[v], nearby[become[v]]);
   }
   return nearby;
 }
 
 /// What the collapses from the finest level to another tell of its distance: no part that is
 /// settled is farther off than `most`.
-CollapseBound settled_by_collapses(const MeasuredLevel& level, const MeasuredLevel& finest,
+CollapseBound settled_by_collapses(MeasuredLevel& level, std::span<const std::uint16_t> finest,
                                    std::span<const glm::dvec3> positions,
                                    const std::vector<std::uint16_t>& become, double most) {
-  std::vector<double> moved(positions.size(), 0.0);
+  const LevelSurface& surface = level.surface();
+  const std::vector<std::uint32_t>& of_vertices = level.of_vertices();
+  std::vector<double> moved(positions.size());
   for (std::size_t v = 0; v < positions.size(); ++v) {
-    if (finest.of_vertices[v] == kNoIndex) continue;
     const glm::dvec3 way = positions[become[v]] - positions[v];
-    moved[v] = level.of_vertices[become[v]] != kNoIndex ? glm::dot(way, way)
-                                                        : std::numeric_limits<double>::infinity();
+    moved[v] = of_vertices[become[v]] != kNoIndex ? glm::dot(way, way)
+                                                  : std::numeric_limits<double>::infinity();
   }
   const auto lands = [&](std::uint32_t t) {
-    const std::uint16_t* v = finest.surface.corners(t);
+    const std::uint16_t* v = &finest[3 * std::size_t{t}];
     const std::uint16_t a = become[v[0]];
     const std::uint16_t b = become[v[1]];
     const std::uint16_t c = become[v[2]];
     if (a != b && b != c && c != a) return true;
     const std::uint16_t other = a != b ? b : c;
-    return a == other || level.surface.has_edge(a, other) || level.surface.has_edge(other, a);
+    return a == other || surface.has_edge(a, other) || surface.has_edge(other, a);
   };
-  return collapse_bound(finest.surface, std::span<const double>(moved), lands, most);
+  return collapse_bound(positions, finest, std::span<const double>(moved), lands, most);
 }
 
 /// Measures what collapses leave open of a level's distance from the finest: one by one.
@@ -422,23 +436,24 @@ double distance_of_open(MeasuredLevel& level, MeasuredLevel& finest,
                         double least) {
   std::vector<std::uint16_t> corners;
   for (const std::uint32_t t : bound.open) {
-    corners.insert(corners.end(), finest.surface.corners(t), finest.surface.corners(t) + 3);
+    const auto first = finest.indices.begin() + 3 * static_cast<std::ptrdiff_t>(t);
+    corners.insert(corners.end(), first, first + 3);
   }
   const std::vector<std::uint32_t> nearby = near_vertices(level, corners, positions, become);
   const double up =
-      surface_distance(finest.surface, level.surface, nearby, least, 0, bound.settled);
+      surface_distance(finest.surface(), level.surface(), nearby, least, 0, bound.settled);
   // Each triangle is what one of the finest has become, in the same order.
   std::vector<std::uint8_t> covered;
-  covered.reserve(level.surface.triangles());
-  for (std::uint32_t t = 0; t < finest.surface.triangles(); ++t) {
-    const std::uint16_t* v = finest.surface.corners(t);
+  covered.reserve(level.triangles());
+  for (std::uint32_t t = 0; t < finest.triangles(); ++t) {
+    const std::uint16_t* v = &finest.indices[3 * std::size_t{t}];
     if (become[v[0]] == become[v[1]] || become[v[1]] == become[v[2]] ||
         become[v[2]] == become[v[0]]) {
       continue;
     }
     covered.push_back(bound.settled[t]);
   }
-  return surface_distance(level.surface, finest.surface, finest.of_vertices, up, 0, covered);
+  return surface_distance(level.surface(), finest.surface(), finest.of_vertices(), up, 0, covered);
 }
 
 /// Measures a level: by the collapses from the finest where they tell enough, or its distance from
@@ -449,20 +464,19 @@ void measure(MeasuredLevel& level, std::vector<MeasuredLevel>& finer,
   const double least = finer.back().error;
   const double enough = std::max(least, hidden);
   MeasuredLevel& finest = finer.front();
-  const CollapseBound bound = settled_by_collapses(level, finest, positions, become, enough);
+  const CollapseBound bound =
+      settled_by_collapses(level, finest.indices, positions, become, enough);
   if (bound.open.empty()) {
     level.error = std::max(least, bound.moved);
-  } else if (bound.open.size() * kMostOpen < finest.surface.triangles()) {
+  } else if (bound.open.size() * kMostOpen < finest.triangles()) {
     level.error =
         distance_of_open(level, finest, positions, become, bound, std::max(least, bound.moved));
   } else {
-    const auto exact = [&](const MeasuredLevel& other) {
-      return other.error <= kNegligible * least;
-    };
+    const auto exact = [&](MeasuredLevel& other) { return other.error <= kNegligible * least; };
     MeasuredLevel& from = *std::find_if(finer.rbegin(), finer.rend(), exact);
-    const double distance = level_distance(from.surface, level.surface,
+    const double distance = level_distance(from.surface(), level.surface(),
                                            near_vertices(level, from.indices, positions, become),
-                                           from.of_vertices, enough - from.error);
+                                           from.of_vertices(), enough - from.error);
     level.error = from.error + distance;
   }
 }
@@ -516,21 +530,26 @@ class ChunkLooker {
 
   /// As ChunkLevel::shading. level: its triangles, with the vertices that carry their normals.
   /// become: what each vertex of the finest has become.
-  double shading(const MeasuredLevel& measured, const std::vector<std::uint16_t>& level,
+  double shading(MeasuredLevel& measured, const std::vector<std::uint16_t>& level,
                  const std::vector<std::uint16_t>& become) {
-    const LevelSurface& surface = measured.surface;
+    const LevelSurface& surface = measured.surface();
+    const std::vector<std::uint32_t>& of_vertices = measured.of_vertices();
+    const std::span<const std::uint16_t> finest = merged_.indices_of(chunk_);
     std::vector<LookDifference> differences(points_.size());
-    for (std::size_t i = 0; i < differences.size(); ++i) {
-      const std::uint16_t* own = &chunk_.indices[step_ * i];
-      const std::uint16_t first = merged_.first.empty() ? own[0] : merged_.first[own[0]];
-      const std::uint32_t start = measured.of_vertices[become[first]];
-      if (start == kNoIndex) continue;
+    // Triangles that stay come in the order of the finest level.
+    std::uint32_t stayed = 0;
+    for (std::size_t at = 0; at < finest.size(); at += 3) {
+      const std::uint16_t a = become[finest[at]];
+      const std::uint16_t b = become[finest[at + 1]];
+      const std::uint16_t c = become[finest[at + 2]];
+      const std::uint32_t start = a != b && b != c && c != a ? stayed++ : of_vertices[a];
+      if (at % step_ != 0 || start == kNoIndex) continue;
+      const std::size_t i = at / step_;
       const std::uint32_t t = surface.walk(points_[i], start);
       const ClosestPoint closest = closest_point(points_[i], surface.triangle(t));
       const Look there =
           look_at(mesh_, vertices_of(&level[3 * std::size_t{t}]), closest.b, closest.c);
-      const Look here = look_at(mesh_, vertices_of(own), 1.0 / 3, 1.0 / 3);
-      differences[i] = {there, here, length_of_uv_, areas_[i]};
+      differences[i] = {there, looks_[i], length_of_uv_, areas_[i]};
     }
     return cells_.smallest_pixel(differences);
   }
@@ -544,6 +563,7 @@ class ChunkLooker {
       const glm::dvec3& c = positions[chunk_.indices[i + 2]];
       points.push_back((a + b + c) / 3.0);
       areas_.push_back(glm::length(glm::cross(b - a, c - a)));
+      looks_.push_back(look_at(mesh_, vertices_of(&chunk_.indices[i]), 1.0 / 3, 1.0 / 3));
     }
     return points;
   }
@@ -557,6 +577,7 @@ class ChunkLooker {
   double length_of_uv_;
   std::size_t step_;  ///< indices from one point to the next
   std::vector<double> areas_;
+  std::vector<Look> looks_;  ///< of the finest level
   std::vector<glm::dvec3> points_;
   PixelCells cells_;
 };
@@ -578,7 +599,7 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkG
   for (const Cut& cut : cuts) {
     const std::size_t collapses = collapses_at(sequence, cut);
     const std::size_t count = triangles_after(sequence, chunk.indices.size() / 3, collapses);
-    const auto before = static_cast<double>(levels.back().surface.triangles());
+    const auto before = static_cast<double>(levels.back().triangles());
     if (count == 0 || static_cast<double>(count) > kWorthwhile * before) continue;
     const std::vector<std::uint16_t> become =
         collapsed_vertices(sequence, collapses, positions.size());
@@ -587,7 +608,7 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkG
     level.halvings = cut.halvings;
     if (!texels.empty()) {
       level.uv_shift =
-          greatest_uv_shift(coarser.surface, {positions, texels}, become,
+          greatest_uv_shift(coarser.surface(), {positions, texels}, become,
                             near_vertices(coarser, finest, positions, become), limits.max_uv_shift);
     }
     level.indices = coarser.indices;

@@ -473,7 +473,9 @@ class StandInMaker {
     const auto lands = [&](std::uint32_t t) {
       return joined_.faces[t] != kNoIndex && collapser_.has(joined_.faces[t]);
     };
-    return collapse_bound(*joined_.surface.triangles, std::span<const double>(moved), lands, most);
+    return collapse_bound(std::span<const glm::dvec3>(joined_.surface.positions),
+                          std::span<const std::uint32_t>(joined_.surface.indices),
+                          std::span<const double>(moved), lands, most);
   }
 
   /// As ChunkLevel::shading. mesh: what the surface is of.
