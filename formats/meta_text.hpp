@@ -10,6 +10,9 @@
 
 namespace modar {
 
+/// How the meta text of a first sight (trim.hpp) begins, and that of no other bundle.
+inline constexpr std::string_view kFirstSightMeta = R"({"stage": "show")";
+
 /// Arrays and objects inside each other; what `modar bake` writes needs six. Readers that call
 /// themselves for each need a bound.
 inline constexpr int kMaxMetaDepth = 32;

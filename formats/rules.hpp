@@ -51,6 +51,7 @@ enum class Rule : std::uint8_t {
   kSectionHash,
   kPadding,
   kMetaText,
+  kFirstSight,
   kModelPlacement,
   kModelCounts,
   kModelErrors,

@@ -1,9 +1,13 @@
 #include "formats/trim.hpp"
 
 #include <algorithm>
+#include <map>
 #include <set>
+#include <utility>
 
 #include "formats/content_summary.hpp"
+#include "formats/meta_text.hpp"
+#include "formats/transport/stages.hpp"
 
 namespace modar {
 namespace {
@@ -69,6 +73,12 @@ void copy_stand_ins(const BundleView& bundle, BundleContent& content) {
   }
 }
 
+void copy_shadows(const BundleView& bundle, BundleContent& content) {
+  for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
+    content.shadows.push_back(bytes_of(bundle.section(SectionType::kShadow, s)));
+  }
+}
+
 void copy_payloads(const BundleView& bundle, BundleContent& content) {
   content.vertices = bytes_of(bundle.vertices());
   content.indices = bytes_of(bundle.indices());
@@ -78,20 +88,16 @@ void copy_payloads(const BundleView& bundle, BundleContent& content) {
   for (std::uint32_t m = 0; m < bundle.media().size(); ++m) {
     content.media_data.push_back(bytes_of(bundle.media_data(m)));
   }
-  for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
-    content.shadows.push_back(bytes_of(bundle.section(SectionType::kShadow, s)));
-  }
-  for (const SectionEntry& entry : bundle.sections()) {
-    const auto type = static_cast<SectionType>(entry.type);
-    if (has_member(type)) continue;
-    content.extra.push_back({entry.type, entry.version, entry.flags, entry.owner, entry.variant,
-                             bytes_of(bundle.section(type, entry.owner, entry.variant))});
-  }
 }
 
-}  // namespace
+ExtraSection extra_of(const BundleView& bundle, const SectionEntry& entry) {
+  const auto type = static_cast<SectionType>(entry.type);
+  return {entry.type,  entry.version, entry.flags,
+          entry.owner, entry.variant, bytes_of(bundle.section(type, entry.owner, entry.variant))};
+}
 
-BundleContent trim(const BundleView& bundle) {
+/// Tables that are about neither stand-ins nor features.
+BundleContent tables_of(const BundleView& bundle) {
   BundleContent content;
   const auto names = bundle.section(SectionType::kNames);
   content.names.assign(reinterpret_cast<const char*>(names.data()), names.size());
@@ -110,9 +116,169 @@ BundleContent trim(const BundleView& bundle) {
   content.nodes = records_of(bundle.nodes());
   content.actions = records_of(bundle.actions());
   content.media = records_of(bundle.media());
+  return content;
+}
+
+// --- The first sight ---
+
+/// Ranges of a section without what lies between them. Those that share bytes go on to share them.
+class Kept {
+ public:
+  Kept(std::span<const std::byte> section, std::vector<StageRange> ranges) {
+    std::sort(ranges.begin(), ranges.end(),
+              [](const StageRange& a, const StageRange& b) { return a.offset < b.offset; });
+    std::uint64_t end = 0;
+    for (const StageRange& range : ranges) {
+      if (runs_.empty() || range.offset > end) {
+        runs_[range.offset] = bytes.size();
+        end = range.offset;
+      }
+      if (range.offset + range.size <= end) continue;
+      const auto more = section.subspan(static_cast<std::size_t>(end),
+                                        static_cast<std::size_t>(range.offset + range.size - end));
+      bytes.insert(bytes.end(), more.begin(), more.end());
+      end += more.size();
+    }
+  }
+  /// Where the range lies now that began at `offset`.
+  [[nodiscard]] std::uint64_t place(std::uint64_t offset) const {
+    const auto run = std::prev(runs_.upper_bound(offset));
+    return run->second + (offset - run->first);
+  }
+
+  std::vector<std::byte> bytes;
+
+ private:
+  std::map<std::uint64_t, std::uint64_t> runs_;  ///< from where one begins to where it lies now
+};
+
+/// A model that its stand-in has taken the place of: one level, off by the stand-in's error.
+void count_anew(ModelRecord& model, std::span<const LevelRecord> levels, float error) {
+  model.level_count = 1;
+  model.position_error_max += static_cast<double>(error) * model.scale;
+  model.vertex_count = 0;
+  model.triangle_count = 0;
+  for (const LevelRecord& level : levels) {
+    model.vertex_count += level.vertex_count;
+    model.triangle_count += level.index_count / 3;
+  }
+}
+
+void keep_shown_geometry(const BundleView& bundle, BundleContent& content) {
+  Kept vertices(bundle.vertices(), shown_geometry(bundle, false));
+  Kept indices(bundle.indices(), shown_geometry(bundle, true));
+  content.chunks.clear();
+  content.levels.clear();
+  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
+    const std::uint32_t stand_in = coarsest_stand_in(bundle, m);
+    const ChunkGroup group = bundle.chunk_group(stand_in == kNone ? m : stand_in);
+    ModelRecord& model = content.models[m];
+    model.first_chunk = static_cast<std::uint32_t>(content.chunks.size());
+    model.chunk_count = group.chunk_count;
+    const std::size_t first = content.levels.size();
+    float error = 0;
+    for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+      ChunkRecord chunk = bundle.chunks()[group.first_chunk + c];
+      for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
+        LevelRecord level = bundle.levels()[chunk.first_level + l];
+        level.vertex_offset = vertices.place(level.vertex_offset);
+        level.index_offset = indices.place(level.index_offset);
+        if (stand_in != kNone) error = std::exchange(level.error, 0.0f);
+        content.levels.push_back(level);
+      }
+      chunk.first_level = static_cast<std::uint32_t>(content.levels.size()) - chunk.level_count;
+      content.chunks.push_back(chunk);
+    }
+    if (stand_in != kNone) count_anew(model, std::span(content.levels).subspan(first), error);
+  }
+  content.vertices = std::move(vertices.bytes);
+  content.indices = std::move(indices.bytes);
+}
+
+void keep_shown_textures(const BundleView& bundle, BundleContent& content) {
+  content.texture_levels.clear();
+  for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
+    TextureRecord& texture = content.textures[t];
+    const Kept blocks(bundle.texture_data(t), shown_blocks(bundle, t));
+    const std::uint32_t first = first_shown_level(bundle, texture);
+    const std::uint32_t from = texture.first_level + first;
+    texture.first_level = static_cast<std::uint32_t>(content.texture_levels.size());
+    texture.level_count -= first;
+    for (std::uint32_t l = 0; l < texture.level_count; ++l) {
+      TextureLevelRecord level = bundle.texture_levels()[from + l];
+      level.offset = blocks.place(level.offset);
+      if (level.alpha_offset != kNoOffset) level.alpha_offset = blocks.place(level.alpha_offset);
+      content.texture_levels.push_back(level);
+    }
+    const TextureLevelRecord& finest = content.texture_levels[texture.first_level];
+    texture.width = finest.width;
+    texture.height = finest.height;
+    texture.psnr_db = finest.psnr_db;
+    texture.ssim = finest.ssim;
+    content.texture_data.push_back(blocks.bytes);
+  }
+}
+
+/// Other sections that are there; orders in which triangles are drawn, of chunks that still are.
+void keep_shown_extra(const BundleView& bundle, BundleContent& content) {
+  for (const SectionEntry& entry : bundle.sections()) {
+    const auto type = static_cast<SectionType>(entry.type);
+    if (has_member(type)) continue;
+    if (entry.type >= kFirstPayload && stage_of(type) != LoadStage::kFind) continue;
+    ExtraSection extra = extra_of(bundle, entry);
+    if (type == SectionType::kDrawOrder) {
+      std::uint32_t m = 0;
+      while (bundle.models()[m].first_chunk + bundle.models()[m].chunk_count <= entry.owner) ++m;
+      if (coarsest_stand_in(bundle, m) != kNone) continue;
+      extra.owner = entry.owner - bundle.models()[m].first_chunk + content.models[m].first_chunk;
+    }
+    content.extra.push_back(std::move(extra));
+  }
+}
+
+/// Files that are played come last, and what acts may act on them; texts of features likewise.
+void leave_out_last(BundleContent& content) {
+  for (auto& sets : content.features) {
+    for (FeatureContent& features : sets) features.yml.clear();
+  }
+  content.media.clear();
+  content.actions.clear();
+  std::erase_if(content.nodes, plays_media);
+}
+
+std::string first_sight_meta(std::string_view meta) {
+  const std::size_t first = meta.find_first_not_of(" \t\r\n", meta.find('{') + 1);
+  const std::string begin(kFirstSightMeta);
+  if (meta.empty() || first == std::string_view::npos) return begin + "}";
+  return begin + (meta[first] == '}' ? "" : ", ") + std::string(meta.substr(first));
+}
+
+}  // namespace
+
+BundleContent trim(const BundleView& bundle) {
+  BundleContent content = tables_of(bundle);
   copy_stand_ins(bundle, content);
   keep_features(bundle, content);
   copy_payloads(bundle, content);
+  copy_shadows(bundle, content);
+  for (const SectionEntry& entry : bundle.sections()) {
+    if (!has_member(static_cast<SectionType>(entry.type))) {
+      content.extra.push_back(extra_of(bundle, entry));
+    }
+  }
+  content.summary = content_summary_of(content);
+  return content;
+}
+
+BundleContent first_sight(const BundleView& bundle) {
+  BundleContent content = tables_of(bundle);
+  content.meta = first_sight_meta(bundle.meta());
+  keep_features(bundle, content);
+  keep_shown_geometry(bundle, content);
+  keep_shown_textures(bundle, content);
+  copy_shadows(bundle, content);
+  keep_shown_extra(bundle, content);
+  leave_out_last(content);
   content.summary = content_summary_of(content);
   return content;
 }

@@ -1,4 +1,5 @@
-// A bundle without what only the ModAR paper's method reads: what travels to pages and apps.
+// Smaller bundles from a bundle: without what only the ModAR paper's method reads, as pages get it,
+// and the first sight of one that is yet to arrive.
 #pragma once
 
 #include "formats/bundle_view.hpp"
@@ -10,5 +11,11 @@ namespace modar {
 /// parameter sets that they name, are left out where a pattern has a tracker record, and the
 /// content summary is made anew. bundle: opened, so that its records are known to be in range.
 BundleContent trim(const BundleView& bundle);
+
+/// What LoadStage::kShow shows of a bundle whose last stage is yet to come, as a good bundle of its
+/// own: of each model the coarsest stand-in, or all where it has none; textures from kShownSide on;
+/// patterns as trim() keeps them. What plays media, and all actions, are left out. bundle: reads
+/// what stages 1 and 2 bring, and nothing else.
+BundleContent first_sight(const BundleView& bundle);
 
 }  // namespace modar

@@ -8,41 +8,6 @@ namespace {
 constexpr std::uint32_t kBlockBytes = 8;     // of ETC1
 constexpr std::uint32_t kTriangleBytes = 6;  // three u16 indices
 
-LoadStage stage_of(SectionType type) {
-  switch (type) {
-    case SectionType::kMappedFeatures:
-    case SectionType::kTrackerRecord:
-    case SectionType::kPatternColours:
-    case SectionType::kPatternShape:
-    // Opening a bundle reads these.
-    case SectionType::kShadow:
-    case SectionType::kDrawOrder:
-      return LoadStage::kFind;
-    default:
-      return LoadStage::kRefine;
-  }
-}
-
-/// The coarsest stand-in of a model as a number of a chunk group; kNone where it has none.
-std::uint32_t coarsest_stand_in(const BundleView& bundle, std::uint32_t model) {
-  for (std::uint32_t i = bundle.stand_ins().size(); i-- > 0;) {
-    if (bundle.stand_ins()[i].model == model) return bundle.models().size() + i;
-  }
-  return kNone;
-}
-
-/// Levels of a texture that are shown first: bytes of its section.
-std::vector<StageRange> shown_blocks(const BundleView& bundle, std::uint32_t number) {
-  const TextureRecord& texture = bundle.textures()[number];
-  std::vector<StageRange> shown;
-  for (std::uint32_t l = first_shown_level(bundle, texture); l < texture.level_count; ++l) {
-    const TextureLevelRecord& level = bundle.texture_levels()[texture.first_level + l];
-    shown.push_back({level.offset, level.size});
-    if (level.alpha_offset != kNoOffset) shown.push_back({level.alpha_offset, level.size});
-  }
-  return shown;
-}
-
 class Planner {
  public:
   explicit Planner(const BundleView& bundle) : bundle_(bundle) {}
@@ -122,6 +87,28 @@ Record& writable(std::span<std::byte> bytes, const BundleView& bundle, const Rec
 
 }  // namespace
 
+LoadStage stage_of(SectionType type) {
+  switch (type) {
+    case SectionType::kMappedFeatures:
+    case SectionType::kTrackerRecord:
+    case SectionType::kPatternColours:
+    case SectionType::kPatternShape:
+    // Opening a bundle reads these.
+    case SectionType::kShadow:
+    case SectionType::kDrawOrder:
+      return LoadStage::kFind;
+    default:
+      return LoadStage::kRefine;
+  }
+}
+
+std::uint32_t coarsest_stand_in(const BundleView& bundle, std::uint32_t model) {
+  for (std::uint32_t i = bundle.stand_ins().size(); i-- > 0;) {
+    if (bundle.stand_ins()[i].model == model) return bundle.models().size() + i;
+  }
+  return kNone;
+}
+
 std::uint32_t first_shown_level(const BundleView& bundle, const TextureRecord& texture) {
   std::uint32_t level = 0;
   for (; level + 1 < texture.level_count; ++level) {
@@ -129,6 +116,17 @@ std::uint32_t first_shown_level(const BundleView& bundle, const TextureRecord& t
     if (std::max<std::uint32_t>(record.width, record.height) <= kShownSide) break;
   }
   return level;
+}
+
+std::vector<StageRange> shown_blocks(const BundleView& bundle, std::uint32_t number) {
+  const TextureRecord& texture = bundle.textures()[number];
+  std::vector<StageRange> shown;
+  for (std::uint32_t l = first_shown_level(bundle, texture); l < texture.level_count; ++l) {
+    const TextureLevelRecord& level = bundle.texture_levels()[texture.first_level + l];
+    shown.push_back({level.offset, level.size});
+    if (level.alpha_offset != kNoOffset) shown.push_back({level.alpha_offset, level.size});
+  }
+  return shown;
 }
 
 std::vector<StageRange> shown_geometry(const BundleView& bundle, bool indices) {

@@ -45,8 +45,17 @@ struct Overlap {
 Overlap overlap(std::uint64_t start, std::uint64_t size, std::uint64_t offset,
                 std::span<const std::byte> bytes);
 
+/// Of a payload other than vertices, indices and texture blocks, which are of several.
+LoadStage stage_of(SectionType type);
+
+/// The coarsest stand-in of a model as a number of a chunk group; kNone where it has none.
+std::uint32_t coarsest_stand_in(const BundleView& bundle, std::uint32_t model);
+
 /// The level of a texture, counted from its finest, from which on LoadStage::kShow shows it.
 std::uint32_t first_shown_level(const BundleView& bundle, const TextureRecord& texture);
+
+/// The levels of a texture that LoadStage::kShow shows: bytes from the start of its section.
+std::vector<StageRange> shown_blocks(const BundleView& bundle, std::uint32_t texture);
 
 /// Of each model its coarsest stand-in, or all of it where it has none, which LoadStage::kShow
 /// shows: bytes from the start of the section of indices or vertices. Unsorted, some more than

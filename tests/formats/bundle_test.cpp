@@ -10,6 +10,7 @@
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
 #include "formats/draw_order.hpp"
+#include "formats/transport/stages.hpp"
 #include "formats/trim.hpp"
 #include "tests/formats/allocation_counter.hpp"
 #include "tests/formats/support.hpp"
@@ -354,6 +355,78 @@ TEST(Bundle, TrimmedHoldsAllThatPlayersRead) {
   EXPECT_GT(dropped, 0u);
   EXPECT_FALSE(after->features(1, content.features[1][0].set_id).keypoints.empty());
   EXPECT_EQ(encode(trim(*after)), small) << "once more changes nothing";
+}
+
+/// Its first texture at 512 x 512, all other things of the format too.
+BundleContent staged_content() {
+  BundleContent content = acting_content();
+  add_stand_ins(content);
+  TextureRecord& texture = content.textures[0];
+  texture.width = texture.height = 512;
+  content.texture_levels.clear();
+  texture.level_count = 0;
+  Bytes& data = content.texture_data[0];
+  data.clear();
+  for (std::uint32_t side = 512; side > 0; side /= 2) {
+    const std::uint32_t size = 8 * ((side + 3) / 4) * ((side + 3) / 4);
+    content.texture_levels.push_back(
+        {data.size(), data.size() + size, size, side, side, 30, 0.9f, 0});
+    data.resize(data.size() + 2 * size, std::byte(++texture.level_count));
+  }
+  content.summary.clear();
+  return content;
+}
+
+TEST(Bundle, TheFirstSightNeedsTwoStagesAndIsAGoodBundle) {
+  const BundleContent content = staged_content();
+  Bytes bytes = encode(content);
+  const auto whole = BundleView::open(bytes);
+  ASSERT_TRUE(whole) << to_line(whole.error());
+  const Bytes wanted = encode(first_sight(*whole));
+  std::size_t late = 0;
+  for (const StageRange& range : stage_ranges(*whole)) {
+    if (range.stage != LoadStage::kRefine) continue;
+    std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(range.offset), range.size,
+                std::byte{0});
+    late += range.size;
+  }
+  EXPECT_GT(late, 2 * 512u * 512 / 2) << "the finest level and its alpha twin";
+  const Bytes got = encode(first_sight(*BundleView::open(bytes)));
+  EXPECT_EQ(got, wanted);
+  const auto lines = report(got);
+  ASSERT_EQ(lines.size(), 2u) << lines.front() << "; " << lines[1];
+  EXPECT_TRUE(lines[0].starts_with("warning BUNDLE_FIRST_SIGHT meta ")) << lines[0];
+  EXPECT_EQ(lines[1], "good");
+}
+
+TEST(Bundle, TheFirstSightHoldsStandInsAndSmallTextures) {
+  const BundleContent content = staged_content();
+  const Bytes bytes = encode(content);
+  const Bytes small = encode(first_sight(*BundleView::open(bytes)));
+  const auto view = BundleView::open(small);
+  ASSERT_TRUE(view) << to_line(view.error());
+  EXPECT_LT(small.size(), bytes.size() / 2);
+  // Of models 0 and 2 the coarsest stand-ins, of 1 all of its own chunks.
+  EXPECT_EQ(view->stand_ins().size(), 0u);
+  EXPECT_EQ(view->models()[0].chunk_count, 1u);
+  EXPECT_EQ(view->models()[0].triangle_count, 3u);
+  EXPECT_EQ(view->models()[1].chunk_count, content.models[1].chunk_count);
+  EXPECT_EQ(view->models()[2].triangle_count, 4u);
+  EXPECT_EQ(view->models()[0].position_error_max,
+            content.models[0].position_error_max + 0.5 * content.models[0].scale);
+  const LevelRecord& level = view->levels()[view->chunks()[0].first_level];
+  const LevelRecord& stand_in = content.stand_in_levels[2];
+  expect_bytes(
+      view->indices().subspan(level.index_offset, 2ull * level.index_count),
+      std::span(content.indices).subspan(stand_in.index_offset, 2ull * stand_in.index_count),
+      "triangles of the stand-in");
+  EXPECT_EQ(view->textures()[0].width, kShownSide);
+  EXPECT_EQ(view->texture_levels()[0].width, kShownSide);
+  EXPECT_EQ(view->texture_data(0)[0], std::byte{2}) << "the second level's blocks";
+  EXPECT_EQ(view->media().size() + view->actions().size(), 0u);
+  EXPECT_EQ(view->nodes().size(), content.nodes.size() - 2) << "without the video and the sound";
+  EXPECT_TRUE(view->meta().starts_with(R"({"stage": "show", "tool":"golden")")) << view->meta();
+  EXPECT_EQ(view->patterns().size(), content.patterns.size());
 }
 
 }  // namespace
