@@ -423,4 +423,10 @@ std::optional<StoreReport> installed_release(const std::string& store) {
   return StoreReport{installed->release.version, installed_paths(*folder, *installed), false};
 }
 
+std::vector<std::string> first_sights(const std::string& store) {
+  using namespace fetch;
+  const auto folder = Folder::open(store, false);
+  return folder ? first_paths(*folder, active_release(*folder)) : std::vector<std::string>();
+}
+
 }  // namespace modar

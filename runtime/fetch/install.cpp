@@ -6,8 +6,12 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <utility>
 
+#include "formats/bundle_view.hpp"
+#include "formats/bundle_writer.hpp"
 #include "formats/check.hpp"
+#include "formats/trim.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/piece.hpp"
 
@@ -102,8 +106,14 @@ struct Assembly {
   std::string recipe_stored;                ///< as downloaded, kept beside the bundle
   std::vector<std::uint64_t> recipe_bytes;  ///< unpacked, aligned
   RecipeView recipe;
-  const Folder* slot;  ///< the spare one
-  std::string name;    ///< of the file in it: NAME.modar
+  bool shows = false;  ///< has a first sight
+};
+
+/// The file that pieces are written into, and which.
+struct Target {
+  const Folder& folder;
+  std::string name;
+  LoadStage last = LoadStage::kRefine;  ///< later ones are left out, and their bytes zero
 };
 
 struct AssemblyCounts {
@@ -123,8 +133,8 @@ Result<void> write_raw(OutputFile& file, const PieceRecord& piece, std::span<std
 }
 
 /// Feature texts are written last, from the mapped features that are in the file by then.
-Result<void> write_texts(const Assembly& assembly, OutputFile& file) {
-  MODAR_ASSIGN(const auto mapped, assembly.slot->map(assembly.name));
+Result<void> write_texts(const Assembly& assembly, const Target& target, OutputFile& file) {
+  MODAR_ASSIGN(const auto mapped, target.folder.map(target.name));
   for (const PieceRecord& piece : assembly.recipe.pieces) {
     if (static_cast<PieceForm>(piece.form) != PieceForm::kFeatureText) continue;
     MODAR_ASSIGN(auto raw, decode_piece(piece, mapped.bytes().subspan(
@@ -140,16 +150,16 @@ Result<std::vector<std::byte>> downloaded(const PieceRecord& piece, const Folder
   return decode_piece(piece, file.bytes());
 }
 
-/// Writes the file of `assembly`: pieces that `source` has from there, the others from
+/// Writes the target's file: pieces that `source` has from there, the others from
 /// `pieces`/ID. Pieces in `damaged` are never taken from `source`; pieces of it that turn out to be
 /// damaged are added to the set, and then the file is left unfinished. Errors: kIo; kInvalidInput.
-Result<void> assemble(const Assembly& assembly, const PieceSource& source, const Folder& pieces,
-                      AssemblyCounts& counts, std::set<ObjectId>& damaged) {
+Result<void> assemble(const Assembly& assembly, const Target& target, const PieceSource& source,
+                      const Folder& pieces, AssemblyCounts& counts, std::set<ObjectId>& damaged) {
   const std::size_t known_damage = damaged.size();
-  MODAR_ASSIGN(auto file, assembly.slot->create(assembly.name));
+  MODAR_ASSIGN(auto file, target.folder.create(target.name));
   MODAR_TRY(file.resize(assembly.bundle.size));  // bytes that no piece covers are zero
   for (const PieceRecord& piece : assembly.recipe.pieces) {
-    if (piece.stored_size == 0) continue;
+    if (piece.stored_size == 0 || piece.stage > static_cast<std::uint8_t>(target.last)) continue;
     const ObjectId id = std::to_array(piece.id);
     if (source.has(id) && !damaged.contains(id)) {
       auto raw = source.raw(id);
@@ -166,8 +176,8 @@ Result<void> assemble(const Assembly& assembly, const PieceSource& source, const
     MODAR_TRY(write_raw(file, piece, raw));
     ++counts.new_pieces;
   }
-  if (damaged.size() != known_damage) return {};
-  MODAR_TRY(write_texts(assembly, file));
+  if (damaged.size() != known_damage || target.last != LoadStage::kRefine) return {};
+  MODAR_TRY(write_texts(assembly, target, file));
   return file.sync();
 }
 
@@ -176,6 +186,9 @@ Result<void> assemble(const Assembly& assembly, const PieceSource& source, const
 /// Left free beyond what is needed, for folders, links and the state: 256 blocks of 4 KiB, of which
 /// each takes one or two.
 constexpr std::uint64_t kSpareBytes = 1u << 20;
+
+/// Most raw bytes of a first sight, which is made in memory. More are shown when they are whole.
+constexpr std::uint64_t kMostFirstBytes = 32u << 20;
 
 /// Reports progress at most ten times a second.
 class ProgressReporter {
@@ -245,9 +258,8 @@ class Installation {
     for (const ReleaseBundle& bundle : chosen_) {
       Assembly& assembly = assemblies_.emplace_back();
       assembly.bundle = bundle;
-      assembly.slot = &slot_;
-      assembly.name = bundle.name + ".modar";
       MODAR_TRY(open_stored_recipe(assembly));
+      assembly.shows = has_first_sight(assembly);
     }
     return {};
   }
@@ -275,24 +287,51 @@ class Installation {
     return {};
   }
 
-  /// Pieces that no installed bundle has, by the size of their objects.
-  [[nodiscard]] std::map<ObjectId, std::uint64_t> missing_pieces() const {
-    std::map<ObjectId, std::uint64_t> sizes;
+  /// Whether somebody wants to show the bundle before all of it is there: none of that name is in
+  /// use.
+  [[nodiscard]] bool has_first_sight(const Assembly& assembly) const {
+    if (!options_.first || shown_bytes(assembly) > kMostFirstBytes) return false;
+    return !active_ || !active_->folder.size(assembly.bundle.name + kWhole);
+  }
+
+  /// Raw bytes of stages 1 and 2; all of a bundle whose recipe states no stages.
+  static std::uint64_t shown_bytes(const Assembly& assembly) {
+    std::uint64_t bytes = 0;
+    for (const PieceRecord& piece : assembly.recipe.pieces) {
+      if (piece.stage == static_cast<std::uint8_t>(LoadStage::kAny)) return kMaxBundleBytes;
+      if (piece.stage <= static_cast<std::uint8_t>(LoadStage::kShow)) bytes += piece.raw_size;
+    }
+    return bytes;
+  }
+
+  struct Missing {
+    std::uint64_t size = 0;  ///< of the object
+    LoadStage stage = LoadStage::kRefine;
+  };
+
+  /// Pieces that no installed bundle has. Those of bundles without a first sight can wait.
+  [[nodiscard]] std::map<ObjectId, Missing> missing_pieces() const {
+    std::map<ObjectId, Missing> missing;
     for (const Assembly& assembly : assemblies_) {
       for (const PieceRecord& piece : assembly.recipe.pieces) {
         const ObjectId id = std::to_array(piece.id);
         if (piece.stored_size == 0 || (source_.has(id) && !damaged_.contains(id))) continue;
-        sizes.emplace(id, piece.stored_size);
+        Missing& entry = missing[id];
+        entry.size = piece.stored_size;
+        if (assembly.shows) entry.stage = std::min(entry.stage, LoadStage{piece.stage});
       }
     }
-    return sizes;
+    return missing;
   }
 
   /// Removes pieces that this release does not need.
   Result<void> tidy_pieces() {
     std::set<std::string> needed;
-    for (const auto& [id, size] : missing_pieces()) needed.insert(to_hex(id));
-    for (const Assembly& assembly : assemblies_) needed.insert(to_hex(assembly.bundle.recipe));
+    for (const auto& [id, piece] : missing_pieces()) needed.insert(to_hex(id));
+    for (const Assembly& assembly : assemblies_) {
+      needed.insert(to_hex(assembly.bundle.recipe));
+      if (assembly.shows) needed.insert(assembly.bundle.name + kFirst);
+    }
     return store_.remove_pieces(needed);
   }
 
@@ -304,25 +343,37 @@ class Installation {
       for (const ReleaseBundle& old : before->release.bundles) {
         if (old.name != assembly.bundle.name || old.hash != assembly.bundle.hash) continue;
         // Under another name, somebody may write to it, or the other slot.
-        if (slot_.has_other_names(assembly.name)) continue;
+        if (slot_.has_other_names(old.name + kWhole)) continue;
         if (has_hash(slot_, assembly.bundle)) kept_.insert(old.name);
       }
     }
     return {};
   }
 
+  /// What is shown first comes first, and is told of before the rest comes.
   Result<void> bring_pieces() {
-    std::vector<ObjectRequest> requests;
+    std::vector<ObjectRequest> first;
+    std::vector<ObjectRequest> rest;
     std::uint64_t total = 0;
     std::uint64_t needed = kSpareBytes;
-    std::uint64_t reclaimed = 0;  // by clearing the spare slot once the pieces are here
-    for (const auto& [id, size] : missing_pieces()) {
-      if (is_whole(id, size)) continue;
-      requests.push_back(request(id, size));
-      total += size;
+    for (const auto& [id, piece] : missing_pieces()) {
+      if (is_whole(id, piece.size)) continue;
+      (piece.stage == LoadStage::kRefine ? rest : first).push_back(request(id, piece.size));
+      total += piece.size;
       const auto part = pieces_.size(to_hex(id) + ".part").value_or(0);
-      needed += size - std::min(part, size);
+      needed += piece.size - std::min(part, piece.size);
     }
+    MODAR_ASSIGN(const std::uint64_t room, room_beside(needed));
+    ProgressReporter progress(options_, total);
+    const auto count = [&](std::int64_t bytes) { progress.add(bytes); };
+    if (!first.empty()) MODAR_TRY(transfers_.objects(first, count));
+    if (!rest.empty()) show_first(room);
+    return transfers_.objects(rest, count);
+  }
+
+  /// Bytes that are free beyond what the release takes. needed: for pieces. Errors: kExitNoSpace.
+  [[nodiscard]] Result<std::uint64_t> room_beside(std::uint64_t needed) const {
+    std::uint64_t reclaimed = 0;  // by clearing the spare slot once the pieces are here
     const std::uint64_t before_clearing = needed;
     for (const Assembly& assembly : assemblies_) {
       if (!kept_.contains(assembly.bundle.name)) needed += assembly.bundle.size;
@@ -333,14 +384,45 @@ class Installation {
     }
     needed = std::max(before_clearing, needed - std::min(needed, reclaimed));
     MODAR_ASSIGN(const auto space, store_.folder().free_space());
-    if (space < needed) {
-      return fail(
-          kExitNoSpace, "fetch.space", store_.folder().path(),
-          std::to_string(needed) + " bytes are needed, " + std::to_string(space) + " are free",
-          "make room and run modar-fetch again");
+    if (space >= needed) return space - needed;
+    return fail(
+        kExitNoSpace, "fetch.space", store_.folder().path(),
+        std::to_string(needed) + " bytes are needed, " + std::to_string(space) + " are free",
+        "make room and run modar-fetch again");
+  }
+
+  /// Tells of the first sights of new bundles, once. Where one cannot be made, its bundle is seen
+  /// when it is whole, or the build says why.
+  void show_first(std::uint64_t room) {
+    std::vector<std::string> paths;
+    for (Assembly& assembly : assemblies_) {
+      if (!std::exchange(assembly.shows, false)) continue;
+      const std::uint64_t bytes = assembly.bundle.size + shown_bytes(assembly);
+      if (bytes > room) continue;
+      const std::string name = assembly.bundle.name + kFirst;
+      const bool made = make_first_sight(assembly, name).has_value();
+      static_cast<void>(pieces_.remove(name + ".part"));
+      if (!made) continue;
+      room -= shown_bytes(assembly);
+      paths.push_back(pieces_.path_of(name));
     }
-    ProgressReporter progress(options_, total);
-    return transfers_.objects(requests, [&](std::int64_t bytes) { progress.add(bytes); });
+    if (!paths.empty()) options_.first(paths);
+  }
+
+  Result<void> make_first_sight(const Assembly& assembly, const std::string& name) {
+    AssemblyCounts counts;
+    const std::size_t known = damaged_.size();
+    const std::string part = name + ".part";
+    MODAR_TRY(
+        assemble(assembly, {pieces_, part, LoadStage::kShow}, source_, pieces_, counts, damaged_));
+    MODAR_ASSIGN(const auto mapped, pieces_.map(part));
+    MODAR_ASSIGN(const BundleView view, BundleView::open(mapped.bytes()));
+    MODAR_ASSIGN(const auto bytes, encode_bundle(first_sight(view)));
+    const std::string error = first_error(bytes, {.release = {}, .accept_newer = true});
+    if (!error.empty() || damaged_.size() != known) {
+      return fail(kExitBadBundle, "store.rules", pieces_.path_of(name), error, "");
+    }
+    return pieces_.replace(name, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   }
 
   /// Whether the store has a piece with the right content; one with the wrong content is removed.
@@ -363,8 +445,8 @@ class Installation {
         continue;
       }
       // The recipe first: clear_slot() takes it for the sign that the bundle is ours.
-      if (slot_.has(assembly.name)) {
-        return fail(ExitCode::kIo, "store.foreign", slot_.path_of(assembly.name),
+      if (const std::string file = assembly.bundle.name + kWhole; slot_.has(file)) {
+        return fail(ExitCode::kIo, "store.foreign", slot_.path_of(file),
                     "modar-fetch did not write it", "move it elsewhere");
       }
       MODAR_TRY(slot_.replace(assembly.bundle.name + ".recipe", assembly.recipe_stored));
@@ -379,7 +461,8 @@ class Installation {
     while (true) {
       const std::size_t known = damaged_.size();
       counts = {};
-      MODAR_TRY(assemble(assembly, source_, pieces_, counts, damaged_));
+      MODAR_TRY(assemble(assembly, {slot_, assembly.bundle.name + kWhole}, source_, pieces_, counts,
+                         damaged_));
       if (damaged_.size() == known) break;
       // An installed bundle is damaged on the disk: download these pieces after all.
       report.corrupt_pieces += static_cast<std::uint32_t>(damaged_.size() - known);
@@ -422,7 +505,7 @@ class Installation {
 }  // namespace
 
 bool has_hash(const Folder& slot, const ReleaseBundle& bundle) {
-  const auto mapped = slot.map(bundle.name + ".modar");
+  const auto mapped = slot.map(bundle.name + kWhole);
   return mapped && mapped->bytes().size() == bundle.size &&
          bundle_hash(mapped->bytes()) == bundle.hash;
 }

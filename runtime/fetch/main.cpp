@@ -30,7 +30,8 @@ Usage:
 
 URL is http(s)://HOST/PATH or a folder (a USB stick) that `modar ship publish` filled. The installed
 bundles are DIR/NAME.modar. If a fetch is interrupted, the release in use stays intact, and the next run
-resumes the download. DIR must be on a file system that supports file locks; if it has no symbolic
+resumes the download. A bundle that is new can be shown early: what DIR/pieces/NAME.first holds, a coarse
+bundle that is there until the release is installed, is told of before the rest comes. DIR must be on a file system that supports file locks; if it has no symbolic
 links (FAT, /sdcard), the bundles are DIR/slots/*/NAME.modar, and these paths are printed.
 
   --store DIR       folder for installed releases; created if it is missing
@@ -202,8 +203,8 @@ class WaitPrinter {
 
 using Writer = rapidjson::PrettyWriter<rapidjson::StringBuffer>;
 
-void write_bundles(Writer& json, const std::vector<std::string>& bundles) {
-  json.Key("bundles");
+void write_paths(Writer& json, const char* key, const std::vector<std::string>& bundles) {
+  json.Key(key);
   json.StartArray();
   for (const std::string& bundle : bundles) json.String(bundle.c_str());
   json.EndArray();
@@ -223,7 +224,7 @@ void print_json(const FetchReport& report) {
   json.String(time_text(report.expires).c_str());
   json.Key("changed");
   json.Bool(report.changed);
-  write_bundles(json, report.bundles);
+  write_paths(json, "bundles", report.bundles);
   put("downloaded_bytes", report.downloaded_bytes);
   put("downloaded_pieces", report.downloaded_pieces);
   put("reused_bytes", report.reused_bytes);
@@ -235,8 +236,15 @@ void print_json(const FetchReport& report) {
 }
 
 /// What the operator of many devices collects. The keys are a contract (formats/shipping.md).
-void write_status(const CommandLine& line, const Error* error, std::uint64_t version, bool changed,
-                  const std::vector<std::string>& bundles) {
+struct Status {
+  const Error* error = nullptr;
+  std::string result = "ok";  ///< unless there is an error
+  std::uint64_t version = 0;  ///< of the release in use
+  bool changed = false;
+  std::vector<std::string> bundles;
+};
+
+void write_status(const CommandLine& line, const Status& status) {
   if (line.status_file.empty()) return;
   rapidjson::StringBuffer buffer;
   Writer json(buffer);
@@ -244,23 +252,47 @@ void write_status(const CommandLine& line, const Error* error, std::uint64_t ver
     json.Key(key);
     json.String(value.c_str());
   };
+  const Error* error = status.error;
   json.StartObject();
   text("program", "modar-fetch " MODAR_VERSION);
   text("time", time_text(std::time(nullptr)));
   text("action", line.verify ? "verify" : "fetch");
-  text("result", error == nullptr ? "ok" : error->code);
+  text("result", error == nullptr ? status.result : error->code);
   json.Key("exit_code");
   json.Int(error == nullptr ? 0 : static_cast<int>(error->exit));
   text("message", error == nullptr ? "" : to_line(*error));
   json.Key("version");
-  json.Uint64(version);
+  json.Uint64(status.version);
   json.Key("changed");
-  json.Bool(changed);
-  write_bundles(json, bundles);
+  json.Bool(status.changed);
+  write_paths(json, "bundles", status.bundles);
+  write_paths(json, "first", first_sights(line.options.store));
   json.EndObject();
   buffer.Put('\n');
   const std::string_view all(buffer.GetString(), buffer.GetSize());
   if (auto written = write_file(line.status_file, all); !written) answer(written.error());
+}
+
+/// What is in use while the fetch goes on, or after it failed.
+Status installed_status(const CommandLine& line) {
+  Status status;
+  if (auto installed = installed_release(line.options.store)) {
+    status.version = installed->version;
+    status.bundles = std::move(installed->bundles);
+  }
+  return status;
+}
+
+/// The rest of the release is yet to come.
+void tell_first(const CommandLine& line, const std::vector<std::string>& paths) {
+  Status status = installed_status(line);
+  status.result = "first";
+  write_status(line, status);
+  if (line.quiet) return;
+  const char* clear = ::isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "";
+  for (const std::string& path : paths) {
+    std::fprintf(stderr, "%smodar-fetch: %s can be shown; the rest follows\n", clear, path.c_str());
+  }
 }
 
 /// Only a status of an earlier run is written over.
@@ -280,17 +312,16 @@ Result<void> keep_no_status(const std::string& path) {
 }
 
 int fail_with_status(const CommandLine& line, const Error& error) {
-  // What is installed stays in use.
-  const auto installed = installed_release(line.options.store);
-  write_status(line, &error, installed ? installed->version : 0, false,
-               installed ? installed->bundles : std::vector<std::string>());
+  Status status = installed_status(line);  // what is installed stays in use
+  status.error = &error;
+  write_status(line, status);
   return answer(error);
 }
 
 int run_verify(const CommandLine& line) {
   const auto report = verify_store(line.options.store);
   if (!report) return fail_with_status(line, report.error());
-  write_status(line, nullptr, report->version, report->fell_back, report->bundles);
+  write_status(line, {nullptr, "ok", report->version, report->fell_back, report->bundles});
   if (line.json) {
     rapidjson::StringBuffer buffer;
     Writer json(buffer);
@@ -299,7 +330,7 @@ int run_verify(const CommandLine& line) {
     json.Uint64(report->version);
     json.Key("fell_back");
     json.Bool(report->fell_back);
-    write_bundles(json, report->bundles);
+    write_paths(json, "bundles", report->bundles);
     json.EndObject();
     std::puts(buffer.GetString());
   } else if (!line.quiet) {
@@ -320,10 +351,11 @@ int run_fetch(CommandLine& line) {
   const bool bar = !line.quiet && !line.json && ::isatty(STDERR_FILENO) != 0;
   if (bar) line.options.progress = show_progress;
   if (!line.quiet) line.options.waiting = WaitPrinter();
+  line.options.first = [&line](const std::vector<std::string>& paths) { tell_first(line, paths); };
   const auto report = fetch_release(line.options);
   if (bar) std::fputs("\r\033[K", stderr);
   if (!report) return fail_with_status(line, report.error());
-  write_status(line, nullptr, report->version, report->changed, report->bundles);
+  write_status(line, {nullptr, "ok", report->version, report->changed, report->bundles});
   for (const std::string& path : report->blocked) {
     std::fprintf(
         stderr, "modar-fetch: %s was not written by modar-fetch and is kept; see the paths below\n",

@@ -14,7 +14,6 @@ namespace {
 constexpr std::size_t kMaxStateBytes = 65536;
 constexpr std::size_t kMaxPointerBytes = 64;
 constexpr std::uint64_t kMaxTime = 253402300799;  // the end of 9999
-constexpr std::string_view kBundle = ".modar";
 constexpr std::string_view kRecipe = ".recipe";
 constexpr std::string_view kLinkTarget = "current/";
 
@@ -29,6 +28,14 @@ bool is_leftover(const Folder& store, const std::string& name) {
 bool is_piece_name(std::string_view name) {
   if (name.ends_with(".part")) name.remove_suffix(5);
   return object_id_of_hex(name).has_value();
+}
+
+/// A first sight, or what a fetch that was killed while making one left behind.
+bool is_first_name(std::string_view name) {
+  const std::size_t at = name.rfind(kFirst);
+  if (at == std::string_view::npos) return false;
+  const std::string_view end = name.substr(at + std::string_view(kFirst).size());
+  return end.empty() || end == ".part" || (end.starts_with('.') && end.ends_with(".tmp"));
 }
 
 /// What `current` says, as a link or as a file.
@@ -194,14 +201,14 @@ Result<void> Store::link_bundles(const Release& release) const {
   const Folder& slot = current_slot(root_) == "slots/a" ? a_ : b_;
   for (const std::string& name : root_.list()) {
     // A link of ours whose bundle is not in use any more.
-    if (name.ends_with(kBundle) && root_.link_target(name) == std::string(kLinkTarget) + name &&
+    if (name.ends_with(kWhole) && root_.link_target(name) == std::string(kLinkTarget) + name &&
         !slot.size(name)) {
       MODAR_TRY(root_.remove(name));
     }
   }
   if (root_.link_target("current").empty()) return {};  // no symbolic links here
   for (const ReleaseBundle& bundle : release.bundles) {
-    const std::string name = bundle.name + std::string(kBundle);
+    const std::string name = bundle.name + kWhole;
     if (!slot.size(name) || root_.has(name)) continue;
     MODAR_ASSIGN(const bool linked, root_.switch_link(name, std::string(kLinkTarget) + name));
     if (!linked) return {};
@@ -212,7 +219,7 @@ Result<void> Store::link_bundles(const Release& release) const {
 std::vector<std::string> installed_paths(const Folder& store, const InstalledRelease& release) {
   std::vector<std::string> paths;
   for (const ReleaseBundle& bundle : release.release.bundles) {
-    const std::string name = bundle.name + std::string(kBundle);
+    const std::string name = bundle.name + kWhole;
     if (!release.folder.size(name)) continue;
     const bool linked = store.link_target(name) == std::string(kLinkTarget) + name;
     paths.push_back(linked ? store.path_of(name) : release.folder.path_of(name));
@@ -220,10 +227,23 @@ std::vector<std::string> installed_paths(const Folder& store, const InstalledRel
   return paths;
 }
 
+std::vector<std::string> first_paths(const Folder& store,
+                                     const std::optional<InstalledRelease>& release) {
+  std::vector<std::string> paths;
+  const auto pieces = store.below("pieces", false);
+  if (!pieces) return paths;
+  for (const std::string& name : pieces->list()) {
+    if (!name.ends_with(kFirst) || !pieces->size(name)) continue;
+    const std::string whole = name.substr(0, name.rfind('.')) + kWhole;
+    if (!release || !release->folder.size(whole)) paths.push_back(pieces->path_of(name));
+  }
+  return paths;
+}
+
 std::vector<std::string> Store::blocked_links(const Release& release) const {
   std::vector<std::string> blocked;
   for (const ReleaseBundle& bundle : release.bundles) {
-    const std::string name = bundle.name + std::string(kBundle);
+    const std::string name = bundle.name + kWhole;
     if (root_.has(name) && root_.link_target(name) != std::string(kLinkTarget) + name) {
       blocked.push_back(root_.path_of(name));
     }
@@ -233,7 +253,9 @@ std::vector<std::string> Store::blocked_links(const Release& release) const {
 
 Result<void> Store::remove_pieces(const std::set<std::string>& keep) const {
   for (const std::string& name : pieces_.list()) {
-    if (!is_piece_name(name) || keep.contains(name.substr(0, name.find('.')))) continue;
+    const bool ours = is_first_name(name) || is_piece_name(name);
+    const bool kept = keep.contains(is_piece_name(name) ? name.substr(0, name.find('.')) : name);
+    if (!ours || kept) continue;
     MODAR_TRY(pieces_.remove(name));
   }
   return {};
@@ -249,7 +271,7 @@ Result<void> Store::clear_slot(const Folder& slot, const std::set<std::string>& 
     if (!name.ends_with(kRecipe)) continue;
     const std::string bundle = name.substr(0, name.size() - kRecipe.size());
     if (keep.contains(bundle)) continue;
-    MODAR_TRY(slot.remove(bundle + std::string(kBundle)));
+    MODAR_TRY(slot.remove(bundle + kWhole));
     MODAR_TRY(slot.remove(name));
   }
   return {};

@@ -39,6 +39,11 @@ struct StoreState {
   bool fresh = true;      ///< nothing is known: a new store, or both copies are lost
 };
 
+/// Endings of files: NAME.modar, in a slot, and NAME.first, the first sight of a bundle, in
+/// `pieces`, which counts as no bundle.
+inline constexpr const char* kWhole = ".modar";
+inline constexpr const char* kFirst = ".first";
+
 /// Reads state.json; nothing if it is damaged.
 std::optional<StoreState> parse_state(std::string_view json);
 
@@ -77,7 +82,8 @@ class Store {
   /// Bundles of the release whose link is missing because somebody else's file has its name.
   [[nodiscard]] std::vector<std::string> blocked_links(const Release& release) const;
 
-  /// Removes pieces and parts of pieces, but for those of the ids in `keep`.
+  /// Removes pieces and parts of pieces, but for those of the ids in `keep`, and first sights, but
+  /// for those whose names are in it.
   Result<void> remove_pieces(const std::set<std::string>& keep) const;
   /// Removes a release from a slot, but for the bundles in `keep`.
   Result<void> clear_slot(const Folder& slot, const std::set<std::string>& keep) const;
@@ -94,6 +100,9 @@ std::string active_slot(const Folder& store);
 std::optional<InstalledRelease> active_release(const Folder& store);
 /// Paths of those of the bundles of the release in use that are installed.
 std::vector<std::string> installed_paths(const Folder& store, const InstalledRelease& release);
+/// Paths of the first sights of bundles of which `release` has none installed.
+std::vector<std::string> first_paths(const Folder& store,
+                                     const std::optional<InstalledRelease>& release);
 
 /// Reads the release in a slot; nothing if it has none.
 std::optional<InstalledRelease> read_slot(const Folder& folder);

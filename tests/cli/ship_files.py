@@ -56,6 +56,18 @@ class Shop:
         picture(self.folder / "picture.png")
         return self.bake("pattern", "--pattern", self.folder / "picture.png", *QUICK)
 
+    @functools.cached_property
+    def staged(self):
+        """Of two colours and so of two chunks, which have stand-ins: the first sight is coarser."""
+        model = sheet(self.folder / "staged.obj", 100, 0.2)
+        lines = model.read_text().splitlines()
+        faces = [i for i, line in enumerate(lines) if line.startswith("f")]
+        for place, colour in ((faces[len(faces) // 2], "blue"), (faces[0], "red")):
+            lines.insert(place, f"usemtl {colour}")
+        model.write_text("mtllib staged.mtl\n" + "\n".join(lines) + "\n")
+        (self.folder / "staged.mtl").write_text("newmtl red\nKd 0.8 0.2 0.2\nnewmtl blue\nKd 0.2 0.3 0.8\n")
+        return self.bake("staged", "--model", model)
+
     def bake(self, name, *arguments):
         bundle = self.folder / name / "museum.modar"
         bundle.parent.mkdir()

@@ -26,7 +26,9 @@ class Kill(ShipTest):
         super().setUp()
         self.publish(self.shop.old)
         self.fetch_json()
-        self.publish(self.shop.new)
+        self.extra = self.folder / "extra.modar"  # has a first sight
+        shutil.copy(self.shop.staged, self.extra)
+        self.publish(self.shop.new, self.extra)
         self.before = self.folder / "before"
         shutil.copytree(self.store, self.before, symlinks=True)
 
@@ -63,7 +65,11 @@ class Kill(ShipTest):
         self.assertIn('"fell_back": false', done.stdout, point)
         data = (self.store / "museum.modar").read_bytes()
         self.assertIn(data, (self.shop.old.read_bytes(), self.shop.new.read_bytes()), point)
-        return data == self.shop.new.read_bytes()
+        extra = self.store / "current" / "extra.modar"
+        self.assertEqual(extra.exists(), data == self.shop.new.read_bytes(), point)
+        if extra.exists():
+            self.assertEqual(extra.read_bytes(), self.extra.read_bytes(), point)
+        return extra.exists()
 
     def left(self):
         """What the store is: every name with its mode and contents, but for what fetch never reads, the times."""
@@ -74,9 +80,9 @@ class Kill(ShipTest):
         points = self.points()
         self.assertGreater(len(points), 200)
         if not soak():
-            # Each kind of call, and every eighth point; `scripts/test.sh --all` takes all.
+            # Each kind of call, and every twelfth point; `scripts/test.sh --all` takes all.
             kinds = {call: i for i, (call, _) in reversed(list(enumerate(points)))}
-            points = [p for i, p in enumerate(points) if i % 8 == 0 or i in kinds.values() or i >= len(points) - 8]
+            points = [p for i, p in enumerate(points) if i % 12 == 0 or i in kinds.values() or i >= len(points) - 8]
         installed, seen = 0, {}
         for call, number in points:
             self.restore()
@@ -87,7 +93,8 @@ class Kill(ShipTest):
                 seen[left] = self.assert_whole((call, number))
                 report = self.fetch_json()
                 self.assertEqual(report["version"], 2)
-                self.assert_installed(self.shop.new)
+                self.assert_installed(self.shop.new, self.extra)
+                self.assertEqual(os.listdir(self.store / "pieces"), [], (call, number))
             installed += seen[left]
         self.assertLess(installed, len(points), "every kill came after the switch")
         self.assertGreater(len(seen), 20)

@@ -70,6 +70,10 @@ struct FetchOptions {
   /// that the app was shipped with. 0: none.
   std::uint64_t least_epoch = 0;
   std::uint64_t least_version = 0;
+  /// Called once, before what refines it comes, with the paths of first sights: a bundle
+  /// (NAME.first) each of which no release in use has one, coarse but good, to show until the fetch
+  /// has ended and removes them. Not called where there is none. May be empty: none are made.
+  std::function<void(const std::vector<std::string>&)> first;
   std::function<void(const FetchProgress&)> progress;  ///< may be empty
   std::function<void(const FetchWait&)> waiting;       ///< may be empty
 };
@@ -109,5 +113,9 @@ Result<StoreReport> verify_store(const std::string& store);
 /// The release in use and the paths of its bundles, read without the lock; nothing if there is
 /// none.
 std::optional<StoreReport> installed_release(const std::string& store);
+
+/// Paths of the first sights that a fetch that was interrupted has left, of bundles that are not
+/// installed; read without the lock.
+std::vector<std::string> first_sights(const std::string& store);
 
 }  // namespace modar

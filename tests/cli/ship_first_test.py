@@ -1,0 +1,106 @@
+"""What modar-fetch shows of a new bundle before all of it has come: made, drawn, taken away again."""
+import json
+import os
+import shutil
+import subprocess
+import time
+import unittest
+
+from programs import BIN
+from ship_files import ShipTest, contents
+
+SIDE = 96  # pixels of a drawn picture
+
+
+class FirstSight(ShipTest):
+    def begin(self, *options):
+        """A fetch that is killed when it has told of the first sight."""
+        status = self.folder / "status.json"
+        fetch = subprocess.Popen([BIN / "modar-fetch", self.site, "--store", self.store, "--trust", self.trust, "--limit-rate", "20k",
+                                  "--status", status, *options], stderr=subprocess.PIPE, text=True)
+        try:
+            for line in fetch.stderr:
+                if "can be shown" in line:
+                    break
+            self.assertIsNone(fetch.poll(), line)
+            return json.loads(status.read_text())
+        finally:
+            fetch.kill()
+            fetch.communicate()
+
+    def drawn(self, bundle):
+        """A view of it, RGB."""
+        out = self.folder / f"drawn-{bundle.name}"
+        done = self.run_program("modar-play", bundle, "--turntable", "1", "--size", f"{SIDE}x{SIDE}", "--out", out, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        raw = subprocess.run(["ffmpeg", "-v", "error", "-i", out / "frame_000000.png", "-pix_fmt", "rgb24", "-f", "rawvideo", "-"],
+                             capture_output=True, check=True).stdout
+        self.assertEqual(len(raw), 3 * SIDE * SIDE)
+        return raw
+
+    def test_a_fetch_that_is_cut_off_leaves_something_to_show(self):
+        self.publish(self.shop.staged)
+        status = self.begin()
+        first = self.store / "pieces" / "museum.first"
+        self.assertEqual((status["result"], status["exit_code"], status["version"]), ("first", 0, 0))
+        self.assertEqual((status["first"], status["bundles"]), ([str(first)], []))
+        self.assertEqual(list(self.store.rglob("*.modar")), [])
+        self.assertFalse((self.store / "current").exists())
+        self.assertEqual(self.run_program("modar-fetch", "--store", self.store, "--verify").returncode, 17)
+        self.assertLess(first.stat().st_size, self.shop.staged.stat().st_size / 2)
+        checked = self.modar("check", first)
+        self.assertEqual(checked.returncode, 0, checked.stderr)
+        self.assertIn("BUNDLE_FIRST_SIGHT", checked.stdout + checked.stderr)
+        coarse, whole = self.drawn(first), self.drawn(self.shop.staged)
+        self.assertNotEqual(coarse, whole)
+        far = sum(abs(a - b) > 48 for a, b in zip(coarse, whole)) / len(whole)
+        self.assertLess(far, 0.05, "the model is another, or not there")
+        ground = whole[:3]
+        model = sum(whole[i:i + 3] != ground for i in range(0, len(whole), 3))
+        self.assertGreater(model, SIDE * SIDE / 8, "the whole bundle shows something")
+        self.assertEqual(self.fetch_json()["bundles"], [str(self.store / "museum.modar")])
+        self.assert_installed(self.shop.staged)
+        self.assertEqual(os.listdir(self.store / "pieces"), [])
+
+    def test_a_bundle_that_is_installed_has_no_first_sight(self):
+        self.publish(self.shop.old)
+        self.fetch_json()
+        self.publish(self.shop.staged)
+        done = self.fetch()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertNotIn("can be shown", done.stderr)
+        self.assert_installed(self.shop.staged)
+
+    def test_a_first_sight_goes_with_its_bundle(self):
+        self.publish(self.shop.staged)
+        self.begin()
+        first, other = self.store / "pieces" / "museum.first", self.folder / "other.modar"
+        made = contents(first)
+        first.write_bytes(b"torn")  # it is made again
+        self.begin()
+        self.assertEqual(contents(first), made)
+        shutil.copy(self.shop.pattern, other)
+        self.publish(other, options=["--drop", "museum"])
+        report = self.fetch_json()
+        self.assertEqual(report["bundles"], [str(self.store / "other.modar")])
+        self.assertEqual(os.listdir(self.store / "pieces"), [])
+
+    def test_planted_names_lead_nothing_outside(self):
+        self.publish(self.shop.staged)
+        pieces, outside = self.store / "pieces", self.folder / "outside"
+        pieces.mkdir(parents=True)
+        outside.write_bytes(b"mine")
+        (pieces / "museum.first").symlink_to(outside)
+        (pieces / "museum.first.part").symlink_to(outside)
+        os.link(outside, pieces / "stranger.first")
+        (pieces / "mine.firstly").write_bytes(b"kept")
+        status = self.begin()
+        self.assertEqual(status["first"], [str(pieces / "museum.first")])
+        self.assertFalse((pieces / "museum.first").is_symlink())
+        self.fetch_json()
+        self.assertEqual((outside.read_bytes(), outside.stat().st_nlink), (b"mine", 1))
+        self.assertEqual(os.listdir(pieces), ["mine.firstly"])
+
+
+if __name__ == "__main__":
+    unittest.main()
