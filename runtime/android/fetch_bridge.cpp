@@ -1,6 +1,7 @@
 // org.modar.Fetch over modar/fetch.hpp: the phone's own HTTP brings the bytes, the installer does
 // the rest.
 #include <string>
+#include <vector>
 
 #include "modar/fetch.hpp"
 #include "runtime/android/bridge.hpp"
@@ -23,6 +24,7 @@ class Transfer {
     buffer_ = env->GetMethodID(type, "buffer", "()[B");
     close_ = env->GetMethodID(type, "close", "()V");
     progress_ = env->GetMethodID(type, "progress", "(JJ)V");
+    first_ = env->GetMethodID(type, "first", "()V");
     env->DeleteLocalRef(type);
   }
 
@@ -41,6 +43,11 @@ class Transfer {
   void progress(const FetchProgress& now) {
     env_->CallVoidMethod(object_, progress_, static_cast<jlong>(now.bytes_done),
                          static_cast<jlong>(now.bytes_total));
+    thrown();
+  }
+
+  void first() {
+    env_->CallVoidMethod(object_, first_);
     thrown();
   }
 
@@ -90,7 +97,23 @@ class Transfer {
   jmethodID buffer_ = nullptr;
   jmethodID close_ = nullptr;
   jmethodID progress_ = nullptr;
+  jmethodID first_ = nullptr;
 };
+
+/// Null where Java has no memory.
+jobjectArray array_of(JNIEnv* env, const std::vector<std::string>& texts) {
+  jclass string = env->FindClass("java/lang/String");
+  if (string == nullptr) return nullptr;
+  const auto count = static_cast<jsize>(texts.size());
+  jobjectArray array = env->NewObjectArray(count, string, nullptr);
+  for (jsize i = 0; array != nullptr && i < count; ++i) {
+    jstring text = env->NewStringUTF(texts[static_cast<std::size_t>(i)].c_str());
+    if (text == nullptr) return nullptr;
+    env->SetObjectArrayElement(array, i, text);
+    env->DeleteLocalRef(text);
+  }
+  return array;
+}
 
 }  // namespace
 }  // namespace modar::android
@@ -113,6 +136,7 @@ MODAR_FETCH(jboolean, fetch)
     return java.bring(path, from, take);
   };
   options.progress = [&java](const modar::FetchProgress& now) { java.progress(now); };
+  options.first = [&java](const std::vector<std::string>&) { java.first(); };
   const auto report = modar::fetch_release(options);
   if (report) return report->changed ? JNI_TRUE : JNI_FALSE;
   throw_fetch_error(env, report.error());
@@ -121,17 +145,11 @@ MODAR_FETCH(jboolean, fetch)
 
 MODAR_FETCH(jobjectArray, installed)(JNIEnv* env, jclass, jstring store) {
   const auto release = modar::installed_release(modar::android::text_of(env, store));
-  const jsize count = release ? static_cast<jsize>(release->bundles.size()) : 0;
-  jclass string = env->FindClass("java/lang/String");
-  if (string == nullptr) return nullptr;
-  jobjectArray paths = env->NewObjectArray(count, string, nullptr);
-  for (jsize i = 0; paths != nullptr && i < count; ++i) {
-    jstring path = env->NewStringUTF(release->bundles[static_cast<std::size_t>(i)].c_str());
-    if (path == nullptr) return nullptr;
-    env->SetObjectArrayElement(paths, i, path);
-    env->DeleteLocalRef(path);
-  }
-  return paths;
+  return modar::android::array_of(env, release ? release->bundles : std::vector<std::string>());
+}
+
+MODAR_FETCH(jobjectArray, first)(JNIEnv* env, jclass, jstring store) {
+  return modar::android::array_of(env, modar::first_sights(modar::android::text_of(env, store)));
 }
 
 MODAR_FETCH(jstring, version)(JNIEnv* env, jclass, jstring store) {

@@ -1,4 +1,6 @@
 """scripts/apk.sh: an APK with Debian's tools alone, and what Android's own tools say of it."""
+import functools
+import http.server
 import os
 import pathlib
 import re
@@ -296,6 +298,39 @@ class Apk(ProgramTest):
         told = self.run_app(apk, clip, home, "", steps)
         for word in ("signature.bad", "fetch.network", "bundle: vase (release)", *(["No space left"] if full else [])):
             self.assertIn(word, told)
+
+    def test_the_first_sight_of_a_release_is_shown(self):
+        """An app without bundles; the server keeps back what comes after the first sight."""
+        bundle, key, home, steps, release = (self.folder / name for name in ("vase.modar", "museum.key", "home", "steps", "release"))
+        done = self.modar("bake", "--model", POTTERY, "--pattern", COVER, "-o", bundle, "--quiet", *QUICK)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for words in (["keygen", "--out", key], ["publish", bundle, "--to", release, "--key", key]):
+            done = self.modar("ship", *words)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        home.mkdir()
+        steps.mkdir()
+
+        class Keeper(http.server.SimpleHTTPRequestHandler):
+            def do_GET(self):
+                while (home / "store/pieces/vase.first").exists() and not (steps / "rest").exists():
+                    time.sleep(0.02)
+                super().do_GET()
+                if (steps / "rest").exists():
+                    (steps / "rest.done").touch()
+
+            def log_message(self, *_):
+                pass
+
+        server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Keeper, directory=release))
+        self.addCleanup(server.server_close)
+        self.addCleanup(server.shutdown)
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        whole, _ = self.made("vases", bundle, "--release", f"http://127.0.0.1:{server.server_port}", "--trust", f"{key}.pub")
+        apk = self.folder / "none.apk"
+        with zipfile.ZipFile(whole) as all_files, zipfile.ZipFile(apk, "w") as few:
+            for name in ("words.properties", "release.txt", "release.pub"):
+                few.writestr(f"assets/{name}", all_files.read(f"assets/{name}"))
+        self.assertIn("bundle: vase (release)", self.run_app(apk, make_clip(self.folder / "clip"), home, "first", steps))
 
     def test_each_language_has_all_words(self):
         def words(file):

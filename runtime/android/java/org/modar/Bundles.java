@@ -20,7 +20,7 @@ import java.util.Properties;
 
 /**
  * Where bundles come from: the release that was fetched, the app's folder, the APK, in this order. One of the same
- * name stands in for another that is damaged.
+ * name stands in for another that is damaged. Where there is none, what a release that is coming shows first.
  */
 final class Bundles {
     /** A bundle: a file, or an asset of the APK. */
@@ -72,7 +72,10 @@ final class Bundles {
         try {
             for (String asset : sorted(context.getAssets().list(ASSETS))) all.add(new Source(nameOf(asset), null, "app"));
         } catch (IOException none) {
-            return all; // an APK without assets
+            // an APK without assets
+        }
+        if (all.isEmpty() && Fetch.AVAILABLE) {
+            for (String path : Fetch.first(store.getPath())) all.add(new Source(nameOf(path), new File(path), "first sight"));
         }
         return all;
     }
@@ -89,7 +92,8 @@ final class Bundles {
 
     private static String nameOf(String path) {
         String file = new File(path).getName();
-        return file.endsWith(ENDING) ? file.substring(0, file.length() - ENDING.length()) : file;
+        int dot = file.lastIndexOf('.');
+        return dot > 0 ? file.substring(0, dot) : file;
     }
 
     /** Maps it: an asset through the APK's own descriptor, at its offset. */

@@ -28,6 +28,9 @@ public final class Fetch {
     /** Paths of the bundles of the release in use; none where there is no release. */
     static native String[] installed(String store);
 
+    /** Paths of what can be shown of bundles that are not installed, until a fetch brings them: NAME.first. */
+    static native String[] first(String store);
+
     /** "7", or "none". */
     static native String version(String store);
 

@@ -51,6 +51,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     private static final int RECORDING = 10;
     private static final int PHOTO = 11;
     private static final int MADE = 12;
+    private static final int FIRST = 13;
     private static final int CHOSEN_PICTURE = 2;
 
     private static final int[] MENU = {R.id.menu_go, R.id.menu_take, R.id.menu_choose, R.id.menu_forget, R.id.own_how, R.id.own_use};
@@ -196,6 +197,9 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
             case SAVED:
                 showIf(findViewById(R.id.share), true);
                 notice(words.get((String) message.obj));
+                break;
+            case FIRST:
+                if (session == 0) showAll();
                 break;
             default:
                 findViewById(R.id.update).setEnabled(true);
@@ -474,6 +478,11 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
             super(url);
             this.url = url;
             this.key = key;
+        }
+
+        @Override
+        void first() {
+            main.sendEmptyMessage(FIRST);
         }
 
         @Override

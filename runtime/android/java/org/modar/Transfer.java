@@ -74,6 +74,9 @@ abstract class Transfer {
         stream = null;
     }
 
+    /** What Fetch.first() names can be shown; the rest of the release is yet to come. */
+    abstract void first();
+
     /** Bytes of the release so far. */
     abstract void progress(long done, long total);
 }

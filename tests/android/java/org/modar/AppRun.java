@@ -49,6 +49,11 @@ public final class AppRun {
             System.out.println("the day is over");
             return;
         }
+        if (words[7].equals("first")) {
+            first(Paths.get(words[8]));
+            System.out.println("the day is over");
+            return;
+        }
         if (words.length > 8) {
             network(Paths.get(words[8]));
             System.out.println("the day is over");
@@ -814,6 +819,32 @@ public final class AppRun {
         }
         app.onPause();
         app.onDestroy();
+    }
+
+    /** The app has no bundle, and the server keeps the last stage back until it is asked for `rest`. */
+    private static void first(Path folder) throws Exception {
+        start();
+        check(status().startsWith("There is nothing to show"), "nothing yet");
+        click(R.id.update);
+        for (int i = 0; i < 600 && Camera.opened == 0; i++) {
+            Handler.pump();
+            Thread.sleep(50);
+        }
+        check(new File(Context.folder, "store/pieces/vase.first").exists() && installed().length == 0, "the first sight alone");
+        check(deliver(0) && deliver(1) && told().contains("vase (first sight)"), "shows the first sight");
+        step(folder, "rest");
+        joinAll("modar-update");
+        check(status().equals("Updated") && installed().length == 1, "installed");
+        check(deliver(0) && deliver(1) && told().contains("vase (release)"), "goes on with the release");
+        app.onDestroy();
+    }
+
+    /** What diagnostics.txt says, after a pause. */
+    private static String told() throws Exception {
+        app.onPause();
+        app.onResume();
+        view.surface(Camera.width, Camera.height, true);
+        return new String(Files.readAllBytes(new File(Context.folder, "diagnostics.txt").toPath()));
     }
 
     private static void step(Path folder, String name) throws Exception {
