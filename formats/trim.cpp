@@ -1,12 +1,14 @@
 #include "formats/trim.hpp"
 
 #include <algorithm>
+#include <cstring>
 #include <map>
 #include <set>
 #include <utility>
 
 #include "formats/content_summary.hpp"
 #include "formats/meta_text.hpp"
+#include "formats/transport/recipe.hpp"
 #include "formats/transport/stages.hpp"
 
 namespace modar {
@@ -268,6 +270,38 @@ BundleContent trim(const BundleView& bundle) {
   }
   content.summary = content_summary_of(content);
   return content;
+}
+
+std::optional<std::vector<std::byte>> hide_twins(std::span<const std::byte> start) {
+  FileHeader header{};
+  if (start.size() < sizeof header) return std::nullopt;
+  std::memcpy(&header, start.data(), sizeof header);
+  const std::size_t room = (start.size() - sizeof header) / sizeof(SectionEntry);
+  if (header.section_count > room) return std::nullopt;
+  std::vector<SectionEntry> table(header.section_count);
+  const std::size_t size = table.size() * sizeof(SectionEntry);
+  std::memcpy(table.data(), start.data() + sizeof header, size);
+  std::set<std::uint32_t> recorded;
+  for (const SectionEntry& entry : table) {
+    if (static_cast<SectionType>(entry.type) == SectionType::kTrackerRecord) {
+      recorded.insert(entry.owner);
+    }
+  }
+  std::erase_if(table, [&](const SectionEntry& entry) {
+    const auto type = static_cast<SectionType>(entry.type);
+    const bool features = type == SectionType::kMappedFeatures || type == SectionType::kFeatureYml;
+    return features && recorded.contains(entry.owner);
+  });
+  header.section_count = static_cast<std::uint32_t>(table.size());
+  std::vector<std::byte> out(sizeof header + size);
+  const auto kept = std::as_bytes(std::span(table));
+  std::memcpy(out.data(), &header, sizeof header);
+  std::copy(kept.begin(), kept.end(), out.begin() + sizeof header);
+  std::vector<std::byte> hashed(out.begin(), out.begin() + offsetof(FileHeader, hash));
+  hashed.insert(hashed.end(), kept.begin(), kept.end());
+  header.hash = raw_hash(hashed);
+  std::memcpy(out.data(), &header, sizeof header);
+  return out;
 }
 
 BundleContent first_sight(const BundleView& bundle) {

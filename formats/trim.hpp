@@ -2,6 +2,11 @@
 // and the first sight of one that is yet to arrive.
 #pragma once
 
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
 #include "formats/bundle_view.hpp"
 #include "formats/bundle_writer.hpp"
 
@@ -11,6 +16,11 @@ namespace modar {
 /// parameter sets that they name, are left out where a pattern has a tracker record, and the
 /// content summary is made anew. bundle: opened, so that its records are known to be in range.
 BundleContent trim(const BundleView& bundle);
+
+/// Takes the feature twins and texts that trim() leaves out from a section table, so that a bundle
+/// without their bytes opens. start: header and section table, whose length stays; nothing where it
+/// is none.
+std::optional<std::vector<std::byte>> hide_twins(std::span<const std::byte> start);
 
 /// What LoadStage::kShow shows of a bundle whose last stage is yet to come, as a good bundle of its
 /// own: of each model the coarsest stand-in, or all where it has none; textures from kShownSide on;

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <numeric>
 #include <optional>
+#include <set>
 
 #include <zstd.h>
 
@@ -118,6 +119,22 @@ struct Covered {
   std::uint64_t begin = 0;
   std::uint64_t end = 0;
 };
+
+/// The stage table, but for feature twins that no first sight needs: they are most of a pattern.
+std::vector<StageRange> recipe_stages(const BundleView& bundle) {
+  std::vector<StageRange> stages = stage_ranges(bundle);
+  std::set<std::uint64_t> late;
+  for (const SectionEntry& entry : bundle.sections()) {
+    const bool twin = entry.type == static_cast<std::uint32_t>(SectionType::kMappedFeatures);
+    if (twin && !bundle.section(SectionType::kTrackerRecord, entry.owner).empty()) {
+      late.insert(entry.offset);
+    }
+  }
+  for (StageRange& range : stages) {
+    if (late.contains(range.offset)) range.stage = LoadStage::kRefine;
+  }
+  return stages;
+}
 
 class RecipeMaker {
  public:
@@ -419,7 +436,7 @@ class RecipeMaker {
 
   const BundleView& bundle_;
   const RecipeOptions& options_;
-  const std::vector<StageRange> stages_ = stage_ranges(bundle_);
+  const std::vector<StageRange> stages_ = recipe_stages(bundle_);
   std::vector<Draft> drafts_;
   std::vector<Covered> covered_;
 };

@@ -415,7 +415,12 @@ class Installation {
     const std::string part = name + ".part";
     MODAR_TRY(
         assemble(assembly, {pieces_, part, LoadStage::kShow}, source_, pieces_, counts, damaged_));
-    MODAR_ASSIGN(const auto mapped, pieces_.map(part));
+    MODAR_ASSIGN(auto mapped, pieces_.map(part));
+    if (const auto start = hide_twins(mapped.bytes())) {
+      MODAR_ASSIGN(auto file, pieces_.resume(part));
+      MODAR_TRY(file.write_at(0, start->data(), start->size()));
+    }
+    MODAR_ASSIGN(mapped, pieces_.map(part));  // with what was written
     MODAR_ASSIGN(const BundleView view, BundleView::open(mapped.bytes()));
     MODAR_ASSIGN(const auto bytes, encode_bundle(first_sight(view)));
     const std::string error = first_error(bytes, {.release = {}, .accept_newer = true});

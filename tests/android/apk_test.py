@@ -1,6 +1,4 @@
 """scripts/apk.sh: an APK with Debian's tools alone, and what Android's own tools say of it."""
-import functools
-import http.server
 import os
 import pathlib
 import re
@@ -17,7 +15,7 @@ from machine import COVER, FAKES, HEIGHT, ROOT, WIDTH, ProgramTest, bake_with_te
 
 from film_project import bake_film, make_frames  # noqa: E402
 from programs import POTTERY, QUICK  # noqa: E402
-from servers import NGINX, Nginx  # noqa: E402
+from servers import NGINX, Keeper, Nginx  # noqa: E402
 
 TOOLS = ("javac", "aapt", "aapt2", "zipalign", "apksigner", "jarsigner", "dexdump", "keytool", "proguard")
 GOLDEN = ROOT / "tests" / "golden" / "v1_0.modar"
@@ -310,22 +308,15 @@ class Apk(ProgramTest):
         home.mkdir()
         steps.mkdir()
 
-        class Keeper(http.server.SimpleHTTPRequestHandler):
-            def do_GET(self):
-                while (home / "store/pieces/vase.first").exists() and not (steps / "rest").exists():
-                    time.sleep(0.02)
-                super().do_GET()
-                if (steps / "rest").exists():
-                    (steps / "rest.done").touch()
+        def held():
+            kept = (home / "store/pieces/vase.first").exists() and not (steps / "rest").exists()
+            if (steps / "rest").exists():
+                (steps / "rest.done").touch()
+            return kept
 
-            def log_message(self, *_):
-                pass
-
-        server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Keeper, directory=release))
-        self.addCleanup(server.server_close)
-        self.addCleanup(server.shutdown)
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        whole, _ = self.made("vases", bundle, "--release", f"http://127.0.0.1:{server.server_port}", "--trust", f"{key}.pub")
+        server = Keeper(release, held)
+        self.addCleanup(server.stop)
+        whole, _ = self.made("vases", bundle, "--release", server.url(), "--trust", f"{key}.pub")
         apk = self.folder / "none.apk"
         with zipfile.ZipFile(whole) as all_files, zipfile.ZipFile(apk, "w") as few:
             for name in ("words.properties", "release.txt", "release.pub"):

@@ -1,4 +1,6 @@
 """Servers on loopback: a real nginx, a line that breaks, and one that misbehaves."""
+import contextlib
+import functools
 import http.server
 import pathlib
 import random
@@ -64,6 +66,33 @@ class Nginx:
     def stop(self):
         self.process.terminate()
         self.process.wait()
+
+
+class Keeper:
+    """Serves `root`, and keeps back what is asked for while `held()`."""
+
+    def __init__(self, root, held):
+        class Handler(http.server.SimpleHTTPRequestHandler):
+            def do_GET(handler):
+                while held() and not self.stopped:
+                    time.sleep(0.02)
+                with contextlib.suppress(OSError):  # the client is gone
+                    super().do_GET()
+
+            def log_message(self, *_):
+                pass
+
+        self.stopped = False
+        self.server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Handler, directory=root))
+        threading.Thread(target=self.server.serve_forever, daemon=True).start()
+
+    def url(self):
+        return f"http://127.0.0.1:{self.server.server_port}"
+
+    def stop(self):
+        self.stopped = True
+        self.server.shutdown()
+        self.server.server_close()
 
 
 class BreakingLine:

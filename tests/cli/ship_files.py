@@ -58,7 +58,11 @@ class Shop:
 
     @functools.cached_property
     def staged(self):
-        """Of two colours and so of two chunks, which have stand-ins: the first sight is coarser."""
+        """Of two colours and so of two chunks, which have stand-ins: the first sight is coarser. Patterns take long to unpack."""
+        return self.bake("staged", "--model", self.two_coloured)
+
+    @functools.cached_property
+    def two_coloured(self):
         model = sheet(self.folder / "staged.obj", 100, 0.2)
         lines = model.read_text().splitlines()
         faces = [i for i, line in enumerate(lines) if line.startswith("f")]
@@ -66,7 +70,7 @@ class Shop:
             lines.insert(place, f"usemtl {colour}")
         model.write_text("mtllib staged.mtl\n" + "\n".join(lines) + "\n")
         (self.folder / "staged.mtl").write_text("newmtl red\nKd 0.8 0.2 0.2\nnewmtl blue\nKd 0.2 0.3 0.8\n")
-        return self.bake("staged", "--model", model)
+        return model
 
     def bake(self, name, *arguments):
         bundle = self.folder / name / "museum.modar"

@@ -3,26 +3,26 @@ import json
 import os
 import shutil
 import subprocess
-import time
 import unittest
 
-from programs import BIN
+from programs import BIN, QUICK, picture
+from servers import Keeper
 from ship_files import ShipTest, contents
 
 SIDE = 96  # pixels of a drawn picture
 
 
 class FirstSight(ShipTest):
-    def begin(self, *options):
-        """A fetch that is killed when it has told of the first sight."""
+    def begin(self):
+        """A fetch that is killed when it has told of the first sight: what its status says then."""
         status = self.folder / "status.json"
-        fetch = subprocess.Popen([BIN / "modar-fetch", self.site, "--store", self.store, "--trust", self.trust, "--limit-rate", "20k",
-                                  "--status", status, *options], stderr=subprocess.PIPE, text=True)
+        status.unlink(missing_ok=True)
+        server = Keeper(self.site, lambda: status.exists() and json.loads(status.read_text())["result"] == "first")
+        self.addCleanup(server.stop)
+        fetch = subprocess.Popen([BIN / "modar-fetch", server.url(), "--store", self.store, "--trust", self.trust, "--status", status],
+                                 stderr=subprocess.PIPE, text=True)
         try:
-            for line in fetch.stderr:
-                if "can be shown" in line:
-                    break
-            self.assertIsNone(fetch.poll(), line)
+            self.assertIn("can be shown", fetch.stderr.readline())
             return json.loads(status.read_text())
         finally:
             fetch.kill()
@@ -39,7 +39,9 @@ class FirstSight(ShipTest):
         return raw
 
     def test_a_fetch_that_is_cut_off_leaves_something_to_show(self):
-        self.publish(self.shop.staged)
+        picture(self.folder / "picture.png")
+        bundle = self.shop.bake("seen", "--model", self.shop.two_coloured, "--pattern", self.folder / "picture.png", *QUICK)
+        self.publish(bundle)
         status = self.begin()
         first = self.store / "pieces" / "museum.first"
         self.assertEqual((status["result"], status["exit_code"], status["version"]), ("first", 0, 0))
@@ -47,11 +49,11 @@ class FirstSight(ShipTest):
         self.assertEqual(list(self.store.rglob("*.modar")), [])
         self.assertFalse((self.store / "current").exists())
         self.assertEqual(self.run_program("modar-fetch", "--store", self.store, "--verify").returncode, 17)
-        self.assertLess(first.stat().st_size, self.shop.staged.stat().st_size / 2)
+        self.assertLess(first.stat().st_size, bundle.stat().st_size / 2)
         checked = self.modar("check", first)
         self.assertEqual(checked.returncode, 0, checked.stderr)
         self.assertIn("BUNDLE_FIRST_SIGHT", checked.stdout + checked.stderr)
-        coarse, whole = self.drawn(first), self.drawn(self.shop.staged)
+        coarse, whole = self.drawn(first), self.drawn(bundle)
         self.assertNotEqual(coarse, whole)
         far = sum(abs(a - b) > 48 for a, b in zip(coarse, whole)) / len(whole)
         self.assertLess(far, 0.05, "the model is another, or not there")
@@ -59,7 +61,7 @@ class FirstSight(ShipTest):
         model = sum(whole[i:i + 3] != ground for i in range(0, len(whole), 3))
         self.assertGreater(model, SIDE * SIDE / 8, "the whole bundle shows something")
         self.assertEqual(self.fetch_json()["bundles"], [str(self.store / "museum.modar")])
-        self.assert_installed(self.shop.staged)
+        self.assert_installed(bundle)
         self.assertEqual(os.listdir(self.store / "pieces"), [])
 
     def test_a_bundle_that_is_installed_has_no_first_sight(self):

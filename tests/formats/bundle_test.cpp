@@ -399,6 +399,39 @@ TEST(Bundle, TheFirstSightNeedsTwoStagesAndIsAGoodBundle) {
   EXPECT_EQ(lines[1], "good");
 }
 
+TEST(Bundle, OpensWithoutTwinsThatTheTableHides) {
+  BundleContent content = staged_content();
+  ExtraSection record;
+  record.type = static_cast<std::uint32_t>(SectionType::kTrackerRecord);
+  record.owner = 0;
+  record.bytes.assign(96, std::byte{1});
+  content.extra.push_back(record);
+  Bytes bytes = encode(content);
+  const auto whole = BundleView::open(bytes);
+  ASSERT_TRUE(whole) << to_line(whole.error());
+  const Bytes wanted = encode(first_sight(*whole));
+  std::size_t hidden = 0;
+  for (const SectionEntry& entry : whole->sections()) {
+    const auto type = static_cast<SectionType>(entry.type);
+    if (type != SectionType::kMappedFeatures && type != SectionType::kFeatureYml) continue;
+    if (entry.owner != 0) continue;
+    std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(entry.offset), entry.size,
+                std::byte{0});
+    ++hidden;
+  }
+  const auto sections = whole->sections().size();
+  EXPECT_FALSE(BundleView::open(bytes)) << "a twin without its header";
+  const auto start = hide_twins(bytes);
+  ASSERT_TRUE(start);
+  std::copy(start->begin(), start->end(), bytes.begin());
+  const auto rest = BundleView::open(bytes);
+  ASSERT_TRUE(rest) << to_line(rest.error());
+  EXPECT_EQ(rest->sections().size(), sections - hidden);
+  EXPECT_EQ(encode(first_sight(*rest)), wanted);
+  EXPECT_FALSE(hide_twins(std::span(bytes).first(63)));
+  EXPECT_FALSE(hide_twins(std::span(bytes).first(64 + 48 * (sections - hidden) - 1)));
+}
+
 TEST(Bundle, TheFirstSightHoldsStandInsAndSmallTextures) {
   const BundleContent content = staged_content();
   const Bytes bytes = encode(content);
