@@ -42,12 +42,8 @@ void check_zero(FaultLog& log, std::span<const std::byte> bytes, std::uint64_t f
 
 void check_meta(FaultLog& log, const BundleParts& parts, const SectionEntry& entry) {
   const std::span<const std::byte> bytes = section_bytes(parts, entry);
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  const auto fault = check_meta_text(text);
+  const auto fault = check_meta_text({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   if (fault) log.add(Rule::kMetaText, entry.offset + fault->offset, "meta", fault->cause);
-  if (text.starts_with(kFirstSightMeta)) {
-    log.add(Rule::kFirstSight, entry.offset, "meta", "models and textures are coarse");
-  }
 }
 
 }  // namespace

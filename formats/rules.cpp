@@ -85,8 +85,6 @@ constexpr IssueKind kIssueKinds[] = {
     {"META_TEXT", Severity::kError,
      "The bundle's description is not a JSON object in UTF-8, or its members are not as specified",
      kRebake},
-    {"BUNDLE_FIRST_SIGHT", Severity::kWarning,
-     "This is what can be shown of a bundle before all of it has come", "run modar-fetch again"},
     {"MODEL_PLACEMENT", Severity::kError,
      "A model's scale and diagonal cannot describe one box, or its chunks do not fit into that "
      "box",

@@ -51,7 +51,6 @@ enum class Rule : std::uint8_t {
   kSectionHash,
   kPadding,
   kMetaText,
-  kFirstSight,
   kModelPlacement,
   kModelCounts,
   kModelErrors,

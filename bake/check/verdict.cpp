@@ -8,6 +8,7 @@
 #include "bake/check/device/device_rules.hpp"
 #include "bake/check/yml_rule.hpp"
 #include "formats/bundle_view.hpp"
+#include "formats/meta_text.hpp"
 #include "modar/mapped_file.hpp"
 
 namespace modar {
@@ -63,6 +64,8 @@ constexpr IssueKind kKinds[] = {
      "use a picture with more texture, evenly spread, or a larger print"},
     {"VISUAL_DIFFERS", Severity::kError, "A model does not look like its source",
      "look at the picture of the worst view; bake with larger textures or a smaller --max-error"},
+    {"BUNDLE_FIRST_SIGHT", Severity::kWarning,
+     "This is what can be shown of a bundle before all of it has come", "run modar-fetch again"},
 };
 static_assert(std::size(kKinds) == static_cast<std::size_t>(WorkstationRule::kCount));
 
@@ -134,15 +137,31 @@ std::map<std::string, std::size_t> Verdict::left_out() const {
   return more;
 }
 
+namespace {
+
+void tell_of_first_sight(const BundleView& bundle, const IssueSink& sink) {
+  const std::string_view meta = bundle.meta();
+  if (!meta.starts_with(kFirstSightMeta)) return;
+  const auto* begin = reinterpret_cast<const std::byte*>(meta.data());
+  sink({&workstation_issue_kind(WorkstationRule::kFirstSight), "meta",
+        static_cast<std::uint64_t>(begin - bundle.bytes().data()), "models and textures are coarse",
+        std::nullopt});
+}
+
+}  // namespace
+
 bool check_whole(std::span<const std::byte> bytes, const DeviceProfile* device,
                  const IssueSink& sink) {
   expect_reading(bytes);
   bool sound = check_bundle(bytes, sink, {.release = forget_read});
   // The text twin needs OpenCV's parser, so this rule stands outside of formats/.
   if (sound) sound = check_yml_twins(bytes, sink);
-  if (!sound || device == nullptr) return sound;
-  if (const auto bundle = BundleView::open(bytes)) check_device(*bundle, *device, sink);
-  return sound;
+  if (!sound) return false;
+  if (const auto bundle = BundleView::open(bytes)) {
+    tell_of_first_sight(*bundle, sink);
+    if (device != nullptr) check_device(*bundle, *device, sink);
+  }
+  return true;
 }
 
 }  // namespace modar

@@ -36,6 +36,7 @@ enum class WorkstationRule : std::uint8_t {
   kSourceScene,
   kPoseRange,
   kVisualDiffers,
+  kFirstSight,
   kCount
 };
 

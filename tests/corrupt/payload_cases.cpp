@@ -222,8 +222,6 @@ constexpr CorruptCase kPayloadCases[] = {
      }},
     {"MEDIA_FLASHES",
      [] { return changed(acting_content(), [](auto& c) { c.media[0].flags |= kMediaFlashes; }); }},
-    {"BUNDLE_FIRST_SIGHT",
-     [] { return changed(model_content(), [](auto& c) { c.meta = R"({"stage": "show"})"; }); }},
     {"SECTION_UNKNOWN",
      [] {
        return changed(pattern_content(), [](auto& c) {
