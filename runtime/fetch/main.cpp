@@ -30,9 +30,10 @@ Usage:
 
 URL is http(s)://HOST/PATH or a folder (a USB stick) that `modar ship publish` filled. The installed
 bundles are DIR/NAME.modar. If a fetch is interrupted, the release in use stays intact, and the next run
-resumes the download. A bundle that is new can be shown early: what DIR/pieces/NAME.first holds, a coarse
-bundle that is there until the release is installed, is told of before the rest comes. DIR must be on a file system that supports file locks; if it has no symbolic
-links (FAT, /sdcard), the bundles are DIR/slots/*/NAME.modar, and these paths are printed.
+resumes the download. A new bundle can be shown early: its coarse models come first, as the bundle
+DIR/pieces/NAME.first, which is named when it is there and removed when the release is installed.
+DIR must be on a file system that supports file locks; if it has no symbolic links (FAT, /sdcard), the
+bundles are DIR/slots/*/NAME.modar, and these paths are printed.
 
   --store DIR       folder for installed releases; created if it is missing
   --trust K.pub     the publisher's public key, from `modar ship keygen`
