@@ -6,7 +6,9 @@
 #include <iterator>
 
 #include "bake/ship/publish.hpp"
+#include "formats/bundle_view.hpp"
 #include "modar/fetch.hpp"
+#include "modar/mapped_file.hpp"
 #include "tests/formats/support.hpp"
 
 namespace modar {
@@ -21,11 +23,13 @@ std::string read(const fs::path& path) {
 
 class ByteSourceTest : public ::testing::Test {
  protected:
-  void SetUp() override {
+  void SetUp() override { publish_as_golden(test::golden_content()); }
+
+  void publish_as_golden(const BundleContent& content) {
     std::string name = (fs::temp_directory_path() / "modar-source-XXXXXX").string();
     ASSERT_NE(::mkdtemp(name.data()), nullptr);
     folder_ = name;
-    const auto bytes = encode_bundle(test::golden_content());
+    const auto bytes = encode_bundle(content);
     ASSERT_TRUE(bytes);
     std::ofstream(folder_ / "golden.modar", std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes->data()),
@@ -93,6 +97,44 @@ TEST_F(ByteSourceTest, InstallsThroughALineThatBreaks) {
   ASSERT_EQ(report->bundles.size(), 1u);
   EXPECT_EQ(read(report->bundles[0]), read(folder_ / "golden.modar"));
   EXPECT_FALSE(fetch_release(options_)->changed);
+}
+
+class FirstSightTest : public ByteSourceTest {
+ protected:
+  void SetUp() override { publish_as_golden(test::acting_content()); }  // media come last
+};
+
+TEST_F(FirstSightTest, IsThereWhenTheLineIsCutBeforeTheRest) {
+  std::vector<std::string> shown;
+  bool cut = true;
+  options_.first = [&shown](const std::vector<std::string>& paths) {
+    shown.insert(shown.end(), paths.begin(), paths.end());
+  };
+  options_.source = [&](const std::string& path, std::uint64_t from,
+                        const auto& take) -> Result<void> {
+    if (cut && !shown.empty()) return fail(ExitCode::kIo, "app.network", path, "no signal", "");
+    MODAR_ASSIGN(const std::string text, file(path));
+    return hand_over(std::string_view(text).substr(from), 4096, take);
+  };
+  ASSERT_FALSE(fetch_release(options_));
+  ASSERT_EQ(shown, std::vector<std::string>{options_.store + "/pieces/golden.first"});
+  EXPECT_EQ(first_sights(options_.store), shown);
+  EXPECT_FALSE(installed_release(options_.store));
+  const auto mapped = MappedFile::open(shown[0]);
+  ASSERT_TRUE(mapped);
+  const auto bundle = BundleView::open(mapped->bytes());
+  ASSERT_TRUE(bundle) << to_line(bundle.error());
+  EXPECT_EQ(bundle->models().size(), test::acting_content().models.size());
+  EXPECT_EQ(bundle->media().size(), 0u);
+
+  cut = false;
+  shown.clear();
+  const auto report = fetch_release(options_);
+  ASSERT_TRUE(report) << to_line(report.error());
+  EXPECT_EQ(shown.size(), 1u) << "once more, by another fetch";
+  EXPECT_EQ(read(report->bundles.at(0)), read(folder_ / "golden.modar"));
+  EXPECT_TRUE(first_sights(options_.store).empty());
+  EXPECT_TRUE(fs::is_empty(folder_ / "store" / "pieces"));
 }
 
 TEST_F(ByteSourceTest, ExpiresByTheAppsClock) {
