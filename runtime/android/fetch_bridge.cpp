@@ -136,7 +136,7 @@ MODAR_FETCH(jboolean, fetch)
     return java.bring(path, from, take);
   };
   options.progress = [&java](const modar::FetchProgress& now) { java.progress(now); };
-  options.first = [&java](const std::vector<std::string>&) { java.first(); };
+  options.first = [&java](const std::string&) { java.first(); };
   const auto report = modar::fetch_release(options);
   if (report) return report->changed ? JNI_TRUE : JNI_FALSE;
   throw_fetch_error(env, report.error());

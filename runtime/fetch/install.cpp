@@ -306,19 +306,21 @@ class Installation {
 
   struct Missing {
     std::uint64_t size = 0;  ///< of the object
-    LoadStage stage = LoadStage::kRefine;
+    std::size_t turn = 0;    ///< number of the first assembly that shows it, or behind the last
   };
 
-  /// Pieces that no installed bundle has. Those of bundles without a first sight can wait.
+  /// Pieces that no installed bundle has.
   [[nodiscard]] std::map<ObjectId, Missing> missing_pieces() const {
     std::map<ObjectId, Missing> missing;
-    for (const Assembly& assembly : assemblies_) {
+    for (std::size_t i = 0; i < assemblies_.size(); ++i) {
+      const Assembly& assembly = assemblies_[i];
       for (const PieceRecord& piece : assembly.recipe.pieces) {
         const ObjectId id = std::to_array(piece.id);
         if (piece.stored_size == 0 || (source_.has(id) && !damaged_.contains(id))) continue;
-        Missing& entry = missing[id];
-        entry.size = piece.stored_size;
-        if (assembly.shows) entry.stage = std::min(entry.stage, LoadStage{piece.stage});
+        const bool shown = assembly.shows && LoadStage{piece.stage} != LoadStage::kRefine;
+        Missing& entry =
+            missing.try_emplace(id, Missing{piece.stored_size, assemblies_.size()}).first->second;
+        if (shown) entry.turn = std::min(entry.turn, i);
       }
     }
     return missing;
@@ -350,25 +352,26 @@ class Installation {
     return {};
   }
 
-  /// What is shown first comes first, and is told of before the rest comes.
+  /// What is shown first comes first, one bundle after the other, then the rest.
   Result<void> bring_pieces() {
-    std::vector<ObjectRequest> first;
-    std::vector<ObjectRequest> rest;
+    std::vector<std::vector<ObjectRequest>> turns(assemblies_.size() + 1);
     std::uint64_t total = 0;
     std::uint64_t needed = kSpareBytes;
     for (const auto& [id, piece] : missing_pieces()) {
       if (is_whole(id, piece.size)) continue;
-      (piece.stage == LoadStage::kRefine ? rest : first).push_back(request(id, piece.size));
+      turns[piece.turn].push_back(request(id, piece.size));
       total += piece.size;
       const auto part = pieces_.size(to_hex(id) + ".part").value_or(0);
       needed += piece.size - std::min(part, piece.size);
     }
-    MODAR_ASSIGN(const std::uint64_t room, room_beside(needed));
+    MODAR_ASSIGN(std::uint64_t room, room_beside(needed));
     ProgressReporter progress(options_, total);
     const auto count = [&](std::int64_t bytes) { progress.add(bytes); };
-    if (!first.empty()) MODAR_TRY(transfers_.objects(first, count));
-    if (!rest.empty()) show_first(room);
-    return transfers_.objects(rest, count);
+    for (std::size_t i = 0; i < assemblies_.size(); ++i) {
+      if (!turns[i].empty()) MODAR_TRY(transfers_.objects(turns[i], count));
+      if (!turns.back().empty()) show_first(assemblies_[i], room);
+    }
+    return transfers_.objects(turns.back(), count);
   }
 
   /// Bytes that are free beyond what the release takes. needed: for pieces. Errors: kExitNoSpace.
@@ -391,22 +394,17 @@ class Installation {
         "make room and run modar-fetch again");
   }
 
-  /// Tells of the first sights of new bundles, once. Where one cannot be made, its bundle is seen
-  /// when it is whole, or the build says why.
-  void show_first(std::uint64_t room) {
-    std::vector<std::string> paths;
-    for (Assembly& assembly : assemblies_) {
-      if (!std::exchange(assembly.shows, false)) continue;
-      const std::uint64_t bytes = assembly.bundle.size + shown_bytes(assembly);
-      if (bytes > room) continue;
-      const std::string name = assembly.bundle.name + kFirst;
-      const bool made = make_first_sight(assembly, name).has_value();
-      static_cast<void>(pieces_.remove(name + ".part"));
-      if (!made) continue;
-      room -= shown_bytes(assembly);
-      paths.push_back(pieces_.path_of(name));
-    }
-    if (!paths.empty()) options_.first(paths);
+  /// Tells of the first sight of a new bundle, once. Where none can be made, the bundle is seen
+  /// when it is whole, or the build says why. room: bytes, less what it takes.
+  void show_first(Assembly& assembly, std::uint64_t& room) {
+    const std::uint64_t bytes = shown_bytes(assembly);
+    if (!std::exchange(assembly.shows, false) || assembly.bundle.size + bytes > room) return;
+    const std::string name = assembly.bundle.name + kFirst;
+    const bool made = make_first_sight(assembly, name).has_value();
+    static_cast<void>(pieces_.remove(name + ".part"));
+    if (!made) return;
+    room -= bytes;
+    options_.first(pieces_.path_of(name));
   }
 
   Result<void> make_first_sight(const Assembly& assembly, const std::string& name) {

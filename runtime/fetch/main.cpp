@@ -285,15 +285,13 @@ Status installed_status(const CommandLine& line) {
 }
 
 /// The rest of the release is yet to come.
-void tell_first(const CommandLine& line, const std::vector<std::string>& paths) {
+void tell_first(const CommandLine& line, const std::string& path) {
   Status status = installed_status(line);
   status.result = "first";
   write_status(line, status);
   if (line.quiet) return;
-  const char* clear = ::isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "";
-  for (const std::string& path : paths) {
-    std::fprintf(stderr, "%smodar-fetch: %s can be shown; the rest follows\n", clear, path.c_str());
-  }
+  std::fprintf(stderr, "%smodar-fetch: %s can be shown; the rest follows\n",
+               ::isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "", path.c_str());
 }
 
 /// Only a status of an earlier run is written over.
@@ -352,7 +350,7 @@ int run_fetch(CommandLine& line) {
   const bool bar = !line.quiet && !line.json && ::isatty(STDERR_FILENO) != 0;
   if (bar) line.options.progress = show_progress;
   if (!line.quiet) line.options.waiting = WaitPrinter();
-  line.options.first = [&line](const std::vector<std::string>& paths) { tell_first(line, paths); };
+  line.options.first = [&line](const std::string& path) { tell_first(line, path); };
   const auto report = fetch_release(line.options);
   if (bar) std::fputs("\r\033[K", stderr);
   if (!report) return fail_with_status(line, report.error());

@@ -302,7 +302,7 @@ class Apk(ProgramTest):
         bundle, key, home, steps, release = (self.folder / name for name in ("vase.modar", "museum.key", "home", "steps", "release"))
         done = self.modar("bake", "--model", POTTERY, "--pattern", COVER, "-o", bundle, "--quiet", *QUICK)
         self.assertEqual(done.returncode, 0, done.stderr)
-        for words in (["keygen", "--out", key], ["publish", bundle, "--to", release, "--key", key]):
+        for words in (["keygen", "--out", key], ["publish", bundle, shutil.copy(bundle, self.folder / "urn.modar"), "--to", release, "--key", key]):
             done = self.modar("ship", *words)
             self.assertEqual(done.returncode, 0, done.stderr)
         home.mkdir()
@@ -321,7 +321,7 @@ class Apk(ProgramTest):
         with zipfile.ZipFile(whole) as all_files, zipfile.ZipFile(apk, "w") as few:
             for name in ("words.properties", "release.txt", "release.pub"):
                 few.writestr(f"assets/{name}", all_files.read(f"assets/{name}"))
-        self.assertIn("bundle: vase (release)", self.run_app(apk, make_clip(self.folder / "clip"), home, "first", steps))
+        self.assertIn("bundle: urn (release)", self.run_app(apk, make_clip(self.folder / "clip"), home, "first", steps))
 
     def test_each_language_has_all_words(self):
         def words(file):

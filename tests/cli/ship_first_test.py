@@ -1,6 +1,7 @@
 """What modar-fetch shows of a new bundle before all of it has come: made, drawn, taken away again."""
 import json
 import os
+import re
 import shutil
 import subprocess
 import unittest
@@ -86,6 +87,15 @@ class FirstSight(ShipTest):
         report = self.fetch_json()
         self.assertEqual(report["bundles"], [str(self.store / "other.modar")])
         self.assertEqual(os.listdir(self.store / "pieces"), [])
+
+    def test_each_bundle_is_shown_as_soon_as_it_can_be(self):
+        other = self.folder / "zebra.modar"
+        shutil.copy(self.shop.pattern, other)
+        self.publish(self.shop.staged, other)
+        self.assertEqual(self.begin()["first"], [str(self.store / "pieces" / "museum.first")])
+        done = self.fetch()
+        self.assertEqual(re.findall(r"(\w+)\.first can be shown", done.stderr), ["museum", "zebra"])
+        self.assert_installed(self.shop.staged, other)
 
     def test_planted_names_lead_nothing_outside(self):
         self.publish(self.shop.staged)

@@ -107,9 +107,7 @@ class FirstSightTest : public ByteSourceTest {
 TEST_F(FirstSightTest, IsThereWhenTheLineIsCutBeforeTheRest) {
   std::vector<std::string> shown;
   bool cut = true;
-  options_.first = [&shown](const std::vector<std::string>& paths) {
-    shown.insert(shown.end(), paths.begin(), paths.end());
-  };
+  options_.first = [&shown](const std::string& path) { shown.push_back(path); };
   options_.source = [&](const std::string& path, std::uint64_t from,
                         const auto& take) -> Result<void> {
     if (cut && !shown.empty()) return fail(ExitCode::kIo, "app.network", path, "no signal", "");

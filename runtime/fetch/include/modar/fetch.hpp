@@ -70,10 +70,10 @@ struct FetchOptions {
   /// that the app was shipped with. 0: none.
   std::uint64_t least_epoch = 0;
   std::uint64_t least_version = 0;
-  /// Called once, before what refines it comes, with the paths of first sights: a bundle
-  /// (NAME.first) each of which no release in use has one, coarse but good, to show until the fetch
-  /// has ended and removes them. Not called where there is none. May be empty: none are made.
-  std::function<void(const std::vector<std::string>&)> first;
+  /// Called for each bundle of which no release in use has one, as soon as it can be shown and
+  /// before the rest of the release comes, with the path of its first sight: a bundle NAME.first,
+  /// coarse but good, that is there until the fetch has ended well. May be empty: none are made.
+  std::function<void(const std::string& path)> first;
   std::function<void(const FetchProgress&)> progress;  ///< may be empty
   std::function<void(const FetchWait&)> waiting;       ///< may be empty
 };

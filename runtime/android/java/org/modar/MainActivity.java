@@ -200,6 +200,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
                 break;
             case FIRST:
                 if (session == 0) showAll();
+                else if (source >= 0) relist(sources.get(source));
                 break;
             default:
                 findViewById(R.id.update).setEnabled(true);
@@ -381,6 +382,19 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         sources = bundles.list();
         source = -1;
         showNext();
+    }
+
+    /** More can be shown, beside what is. */
+    private void relist(Bundles.Source shown) {
+        List<Bundles.Source> all = bundles.list();
+        for (int i = 0; i < all.size(); i++) {
+            if (!all.get(i).name.equals(shown.name) || !all.get(i).origin.equals(shown.origin)) continue;
+            all.set(i, shown);
+            sources = all;
+            source = i;
+            showMore();
+            return;
+        }
     }
 
     private void use(int index, long opened) throws ModarException {

@@ -12,6 +12,7 @@ import android.media.ImageReader;
 import android.opengl.GLSurfaceView;
 import android.os.Handler;
 import android.view.MotionEvent;
+import android.view.View;
 import android.widget.TextView;
 import java.io.File;
 import java.nio.ByteBuffer;
@@ -830,12 +831,19 @@ public final class AppRun {
             Handler.pump();
             Thread.sleep(50);
         }
-        check(new File(Context.folder, "store/pieces/vase.first").exists() && installed().length == 0, "the first sight alone");
-        check(deliver(0) && deliver(1) && told().contains("vase (first sight)"), "shows the first sight");
+        check(new File(Context.folder, "store/pieces/urn.first").exists() && installed().length == 0, "the first sight alone");
+        check(deliver(0) && deliver(1) && told().contains("urn (first sight)"), "shows the first sight");
+        View more = app.findViewById(R.id.models);
+        for (int i = 0; i < 600 && more.getVisibility() != View.VISIBLE; i++) {
+            Handler.pump();
+            Thread.sleep(50);
+        }
+        click(R.id.models);
+        check(deliver(0) && deliver(1) && told().contains("vase (first sight)"), "shows the other bundle's");
         step(folder, "rest");
         joinAll("modar-update");
-        check(status().equals("Updated") && installed().length == 1, "installed");
-        check(deliver(0) && deliver(1) && told().contains("vase (release)"), "goes on with the release");
+        check(status().equals("Updated") && installed().length == 2, "installed");
+        check(deliver(0) && deliver(1) && told().contains("urn (release)"), "goes on with the release");
         app.onDestroy();
     }
 
