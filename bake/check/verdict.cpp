@@ -65,7 +65,8 @@ constexpr IssueKind kKinds[] = {
     {"VISUAL_DIFFERS", Severity::kError, "A model does not look like its source",
      "look at the picture of the worst view; bake with larger textures or a smaller --max-error"},
     {"BUNDLE_FIRST_SIGHT", Severity::kWarning,
-     "This is what can be shown of a bundle before all of it has come", "run modar-fetch again"},
+     "This is what can be shown of a bundle before all of it has come",
+     "copy or download all of it: run modar-fetch again"},
 };
 static_assert(std::size(kKinds) == static_cast<std::size_t>(WorkstationRule::kCount));
 
