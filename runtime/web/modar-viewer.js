@@ -599,7 +599,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     this.#$('pause').setAttribute('aria-pressed', 'false');
     this.#useLanguages();
     this.#cues.clear();
-    view.addEventListener('drawn', () => this.#showMarks());
+    view.addEventListener('drawn', () => { if (this.#state !== 'start') this.#showMarks(); });  // a last frame may come late
     view.addEventListener('caption', ({ detail }) => this.#caption(detail));
     view.addEventListener('text', ({ detail: { node } }) => {
       const { pattern, name, mark } = view.nodes[node];
