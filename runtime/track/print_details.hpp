@@ -27,7 +27,7 @@ class PrintDetails {
   /// Compares `count` cells that do not agree yet. from: direction from the pattern to the camera.
   void look(const TrackedPattern& print, const PlaneMap& map, std::span<const GrayImage> pyramid,
             const glm::vec3& from, int count);
-  /// Printed differences that cells in agreement surround.
+  /// Cells of printed differences that cells in agreement surround.
   [[nodiscard]] int differences() const;
 
  private:

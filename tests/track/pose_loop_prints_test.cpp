@@ -6,6 +6,7 @@
 
 #include "bake/lab/field_scene.hpp"
 #include "modar/pose_loop.hpp"
+#include "runtime/track/print_details.hpp"
 #include "runtime/track/print_verifier.hpp"
 #include "tests/track/pose_loop_samples.hpp"
 
@@ -111,6 +112,56 @@ TEST(Prints, AnotherTitleIsTakenBackWithinTwoSeconds) {
   TrackResult seen;
   EXPECT_EQ(shown_late(*loop, frames, seen), 0);
   EXPECT_EQ(seen.reason, Reason::kOtherPrint);
+}
+
+constexpr int kDetailPixels = 20;  // of a cell
+
+cv::Rect detail(int x, int y, int width, int height) {
+  return {kDetailPixels * x, kDetailPixels * y, kDetailPixels * width, kDetailPixels * height};
+}
+
+/// Cells that differ, of a frame that shows `seen` in the print's place, from two directions.
+int differences(const tracker::TrackedPattern& print, const cv::Mat& seen) {
+  cv::Mat frame(480, 480, CV_8UC1, cv::Scalar(128));
+  seen.copyTo(frame(cv::Rect(80, 80, seen.cols, seen.rows)));
+  cv::Mat half;
+  cv::resize(frame, half, {}, 0.5, 0.5, cv::INTER_AREA);
+  const std::array<GrayImage, 2> pyramid = {gray(frame), gray(half)};
+  tracker::PlaneMap map;
+  map.homography[2] = {80.0, 80.0, 1.0};
+  tracker::PrintDetails details;
+  for (const glm::vec3& from : {glm::vec3(0, 0, 1), glm::vec3(0.5f, 0, 0.866f)}) {
+    for (int k = 0; k < 4; ++k) {
+      details.look(print, map, pyramid, from, tracker::PrintDetails::kDetailCells);
+    }
+  }
+  return details.differences();
+}
+
+// Two cells of another picture, and seven beside them that show nothing: all nine are another
+// print's. One cell of nine tells nothing of the others.
+TEST(Prints, WhatIsConnectedWithPrintedDifferencesDiffers) {
+  const int side = kDetailPixels * tracker::PrintDetails::kSide;
+  cv::Mat own = textured_picture(side, side, 41);
+  const auto halves = [](cv::Mat& print, int at, bool upright) {
+    cv::Mat cell = print(detail(at, at, 1, 1));
+    cell.setTo(20);
+    (upright ? cell.colRange(kDetailPixels / 2, kDetailPixels)
+             : cell.rowRange(kDetailPixels / 2, kDetailPixels))
+        .setTo(235);
+  };
+  for (const int at : {5, 7}) halves(own, at, true);
+  const auto bytes = record_of(own);
+  const auto print = tracker::view_tracked_pattern(bytes, 0);
+  ASSERT_TRUE(print) << to_line(print.error());
+  cv::Mat seen = own.clone();
+  EXPECT_EQ(differences(*print, seen), 0);
+  seen(detail(5, 5, 3, 3)).setTo(128);
+  EXPECT_EQ(differences(*print, seen), 0);
+  halves(seen, 5, false);
+  EXPECT_EQ(differences(*print, seen), 1);
+  halves(seen, 7, false);
+  EXPECT_EQ(differences(*print, seen), 9);
 }
 
 TEST(Prints, TheTitleItselfStaysWhenHeldAndWhenCovered) {
