@@ -142,10 +142,10 @@ export class View extends EventTarget {
 
   /** What is drawn now fades over what is drawn from now on, while the models stand still. */
   #fade() {
-    if (this.#empty || this.#lost || !this.#drawnAt || !this.#models.isConnected) return;
+    if (this.#empty || this.#lost || !this.#drawnAt) return;
     const models = this.#models;
     const copy = models.cloneNode();
-    copy.removeAttribute('id');
+    copy.id = '';
     const { offsetLeft, offsetTop, clientWidth, clientHeight } = models;
     copy.style = `position:absolute;left:${offsetLeft}px;top:${offsetTop}px;width:${clientWidth}px;height:${clientHeight}px;pointer-events:none`;
     this.#redraw();
