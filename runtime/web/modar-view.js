@@ -13,7 +13,7 @@ const MOST_BYTES = 64 << 20;
 /** Milliseconds without a frame after which what turns by itself is drawn without one. */
 const STILL_MS = 60;
 const LIGHT_WIDTH = 160;
-/** Milliseconds that finer models take to replace coarser ones, and how much of a pose may change meanwhile: some pixels. Set by hand. */
+/** Milliseconds that finer models take to replace coarser ones, and how much of a pose may change meanwhile, some pixels: more shows two models beside each other. Set by hand. */
 const FADE_MS = 250, FADE_MOVED = 0.03;
 
 function openContext(canvas, webgl1) {
@@ -75,8 +75,9 @@ export class View extends EventTarget {
   #handle = 0;
   #covered = new Map();
   #drawings = 0;
-  /** {copy: a canvas that fades, poses: of what it shows} */
+  /** Poses of a picture that fades, and what takes it away. */
   #faded = null;
+  #endFade;
 
   /**
    * @param {Modar | Uint8Array | Promise<Modar | Uint8Array>} bundle which may still be on its way
@@ -144,24 +145,20 @@ export class View extends EventTarget {
   #fade() {
     if (this.#empty || this.#lost || !this.#drawnAt) return;
     const models = this.#models;
-    const copy = models.cloneNode();
-    copy.id = '';
-    const { offsetLeft, offsetTop, clientWidth, clientHeight } = models;
+    const { width, height, className, offsetLeft, offsetTop, clientWidth, clientHeight } = models;
+    const copy = Object.assign(document.createElement('canvas'), { width, height, className });
     copy.style = `position:absolute;left:${offsetLeft}px;top:${offsetTop}px;width:${clientWidth}px;height:${clientHeight}px;pointer-events:none`;
     this.#redraw();
     copy.getContext('2d').drawImage(models, 0, 0);
     models.after(copy);
-    copy.animate({ opacity: [1, 0] }, FADE_MS).onfinish = () => copy.remove();
-    this.#faded = { copy, poses: this.#engine.poses().slice() };
+    this.#faded = this.#engine.poses().slice();
+    this.#endFade = () => {
+      copy.remove();
+      this.#faded = null;
+    };
+    copy.animate({ opacity: [1, 0] }, FADE_MS).onfinish = this.#endFade;
   }
 
-  /** A picture of other poses would be seen beside the models. */
-  #endFade() {
-    const poses = this.#engine.poses();
-    if (!this.#faded?.poses.some((value, i) => i % POSE_FLOATS >= POSE.view && Math.abs(value - poses[i]) > FADE_MOVED)) return;
-    this.#faded.copy.remove();
-    this.#faded = null;
-  }
 
   #showCoarse() {
     this.#coarse = true;
@@ -318,7 +315,10 @@ export class View extends EventTarget {
 
   /** Acts and draws what was drawn last. */
   #again() {
-    this.#endFade();
+    if (this.#faded) {  // a picture of other poses would be seen beside the models
+      const poses = this.#engine.poses();
+      if (this.#faded.some((value, i) => i % POSE_FLOATS >= POSE.view && Math.abs(value - poses[i]) > FADE_MOVED)) this.#endFade();
+    }
     this.#act();
     this.#redraw();
     this.#wanted?.ask();

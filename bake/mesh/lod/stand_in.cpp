@@ -418,6 +418,11 @@ class StandInMaker {
   }
 
  private:
+  /// Whether a triangle of the joined levels has become one of the stand-in.
+  [[nodiscard]] bool is_left(std::uint32_t t) const {
+    return joined_.faces[t] != kNoIndex && collapser_.has(joined_.faces[t]);
+  }
+
   /// Of a new stand-in from level 0: by the collapses from the joined levels where they tell enough
   /// beside the shading, or measured.
   double error_of(Measured& surface, const TrianglesAt& at, double shading) {
@@ -426,9 +431,7 @@ class StandInMaker {
     const double enough = std::max(least, hidden * shading) - joined_.surface.error;
     const CollapseBound bound = settled_by_collapses(surface, at, enough);
     if (bound.open.empty()) return std::max(least, joined_.surface.error + bound.moved);
-    const auto stays = [&](std::uint32_t t) {
-      return joined_.faces[t] != kNoIndex && collapser_.has(joined_.faces[t]);
-    };
+    const auto stays = [this](std::uint32_t t) { return is_left(t); };
     if (std::none_of(bound.open.begin(), bound.open.end(), stays)) {
       // All of the stand-in is near the joined levels.
       std::vector<std::uint32_t> corners;
@@ -470,9 +473,7 @@ class StandInMaker {
       const double way = glm::length(joined_.surface.positions[v] - points[place]) + apart;
       moved[v] = at[place] == kNoIndex ? std::numeric_limits<double>::infinity() : way * way;
     }
-    const auto lands = [&](std::uint32_t t) {
-      return joined_.faces[t] != kNoIndex && collapser_.has(joined_.faces[t]);
-    };
+    const auto lands = [this](std::uint32_t t) { return is_left(t); };
     return collapse_bound(std::span<const glm::dvec3>(joined_.surface.positions),
                           std::span<const std::uint32_t>(joined_.surface.indices),
                           std::span<const double>(moved), lands, most);
