@@ -351,7 +351,7 @@ void PlaneMatcher::begin_vote(std::size_t most) {
 }
 
 bool PlaneMatcher::vote(std::int64_t& work) {
-  constexpr std::int64_t kMatchCost = 20;  // instructions, as scripts/foreign.sh counts them
+  constexpr std::int64_t kMatchCost = 70;  // instructions, as scripts/foreign.sh counts them
   for (; voted_ < order_.size(); ++voted_) {
     if (work <= 0) return false;
     work -= kMatchCost * static_cast<std::int64_t>(matches_.size());
