@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Memory that a visit takes for a bundle, in Chromium: of all of its processes, beside what a blank page takes.
 
-    page_memory.py BUNDLE [--raw | --packed] [--page FOLDER] [--small BUNDLE]
+    page_memory.py BUNDLE [--raw | --packed] [--page FOLDER] [--small BUNDLE] [--mbit N]
 
 Makes the page of `modar web`, opens a blank page of the same host, then the bundle's, and looks around without a camera until all is
 there. Prints JSON, in MB: resident memory (each page of memory counted by its share) of the blank page and of the visit, its greatest
@@ -55,14 +55,16 @@ def settle(browser, seconds=3):
     return resident_by_process(browser.process.pid)
 
 
-def visit(site, waits=200):
-    """Resident bytes by process: of a blank page, at the end of a visit, and where their sum was greatest meanwhile."""
+def visit(site, mbit, waits=200):
+    """Resident bytes by process: of a blank page, at the end of a visit, and where their sum was greatest meanwhile. mbit: of the line, or None."""
     server, folder = serve(site), tempfile.mkdtemp(prefix="modar-memory-")
     browser = Browser(folder, "none.y4m")
     try:
         (site / "blank.html").write_text("<!doctype html><title>blank</title>")
         browser.open(f"http://localhost:{server.server_port}/blank.html")
         blank = settle(browser)
+        if mbit:
+            browser.throttle(1e6 * mbit / 8, 50)
         browser.call("Page.addScriptToEvaluateOnNewDocument", source=PRESS)
         browser.call("Page.navigate", url=f"http://localhost:{server.server_port}/")
         most, end = blank, time.monotonic() + waits
@@ -81,11 +83,11 @@ def visit(site, waits=200):
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def measure(bundle, page, raw):
+def measure(bundle, page, raw, mbit):
     with tempfile.TemporaryDirectory(prefix="modar-memory-site-") as name:
         site = pathlib.Path(name) / "site"
         make_site(site, bundle, page, raw)
-        return visit(site)
+        return visit(site, mbit)
 
 
 def main():
@@ -95,14 +97,15 @@ def main():
     parser.add_argument("--packed", action="store_true", help="the packed bundle alone")
     parser.add_argument("--page", help="of another build")
     parser.add_argument("--small", type=pathlib.Path, help="a small bundle")
+    parser.add_argument("--mbit", type=float, help="of the line; without, as fast as this machine sends")
     options = parser.parse_args()
     size = options.bundle.stat().st_size
     for raw in [True] * (not options.packed) + [False] * (not options.raw):
         rest = 0
         if options.small:
-            blank, done, _ = measure(options.small, options.page, raw)
+            blank, done, _ = measure(options.small, options.page, raw, options.mbit)
             rest = sum(done.values()) - sum(blank.values()) - options.small.stat().st_size
-        blank, done, most = measure(options.bundle, options.page, raw)
+        blank, done, most = measure(options.bundle, options.page, raw, options.mbit)
         base = sum(blank.values()) + rest
         print(json.dumps({"bundle": "raw" if raw else "packed", "bundle_mb": round(size / 1e6, 1), "blank_mb": round(sum(blank.values()) / 1e6, 1),
                           "page_mb": round(rest / 1e6, 1), "visit_mb": round(sum(done.values()) / 1e6, 1), "most_mb": round(sum(most.values()) / 1e6, 1),

@@ -71,8 +71,10 @@ struct StandInPlan {
   std::vector<std::uint32_t> halvings;
 };
 
-/// Meshes of one chunk have borders that nothing else meets, small ones need no coarser levels.
-/// options: of the chunks' levels, with which stand-ins are counted.
+/// Small meshes need none. Those of one chunk have borders that nothing else meets, so that only
+/// the coarsest level is one: all that a first sight brings of the model (see LoadStage::kShow; of
+/// a scan of 70,000 triangles 12 KB instead of 546). options: of the chunks' levels, with which
+/// stand-ins are counted.
 StandInPlan plan_stand_ins(const ChunkedMesh& mesh, const LevelOptions& options);
 
 struct StandInOptions {

@@ -516,12 +516,15 @@ StandInPlan plan_stand_ins(const ChunkedMesh& mesh, const LevelOptions& options)
   const std::size_t triangles = triangles_in(mesh);
   std::uint32_t first = kFirstHalving;
   while (triangles >> first > kMostStandIn) ++first;
-  if (mesh.chunks.size() < 2 || triangles >> first < kLeastStandIn) return plan;
+  if (triangles >> first < kLeastStandIn) return plan;
+  std::uint32_t last = first;
+  while (triangles >> (last + 1) >= kLeastStandIn) ++last;
+  // A single chunk's borders meet nothing, and its levels' vertices cost nothing: the coarsest
+  // only.
+  if (mesh.chunks.size() < 2) first = last = std::max(first, std::min(last, options.levels - 1));
   LevelOptions before = options;
   before.most_halvings = first - 1;
   const std::size_t levels = 1 + halvings_of(triangles, before).size();
-  std::uint32_t last = first;
-  while (triangles >> (last + 1) >= kLeastStandIn) ++last;
   for (std::uint32_t at = first; levels + plan.halvings.size() < options.levels;) {
     plan.halvings.push_back(at);
     if (at == last) break;
