@@ -19,6 +19,8 @@ const SCOPE = new URL('./', location).href;
 const KEPT_LANGUAGE = 'modar-language';
 /** Bundles that this visit brings, for sw.js, which takes them from here. */
 const BROUGHT = `modar ${SCOPE} brought`;
+/** Bytes of a bundle's copy that are written together: few are in memory, or lost where a visit is broken off. Set by hand. */
+const PART_BYTES = 1e6;
 /** Pictures of the visitor's own. */
 const OWN_CACHE = `modar own ${SCOPE}`;
 
@@ -115,21 +117,45 @@ const canKeep = () => !forgotten && 'serviceWorker' in navigator && globalThis.i
 
 /**
  * Writes a bundle that comes into BROUGHT: the browser's own cache does not hold what was asked for by ranges, and the service worker
- * would bring it a second time. As a stream, which takes no memory of the page's. null: a service worker has the bundle, or none will.
+ * would bring it a second time. In parts, since browsers hold a body in memory until it has ended; a visit that follows one that was
+ * broken off begins with them. null: the service worker has the bundle, or none will.
  */
-function copyOf(address) {
-  if (!canKeep() || navigator.serviceWorker.controller) return null;
-  let to;
-  const drop = () => { to = null; };
-  const body = new ReadableStream({ start(controller) { to = controller; }, cancel: drop });
-  brought = caches.open(BROUGHT).then((cache) => cache.put(address, new Response(body))).catch(drop);
-  return { add: (bytes) => to?.enqueue(bytes), end: (whole) => (whole ? to?.close() : to?.error()) };
+async function copyOf(address) {
+  if (!canKeep() || await caches.match(address).catch(() => true)) return null;
+  const cache = caches.open(BROUGHT);
+  const part = (at) => `${address}&part=${at}`;
+  let parts = [], size = 0, at = 0;
+  brought = cache;
+  const put = (name, body) => {
+    const response = new Response(body);
+    brought = brought.then(() => cache).then((there) => there.put(name, response));
+    brought.catch(() => {});
+  };
+  const cut = (bytes) => {
+    const all = new Blob(parts);
+    put(part(at), all.slice(0, bytes));
+    parts = [all.slice(bytes)];
+    size -= bytes;
+    at += bytes;
+  };
+  return {
+    add(bytes) {
+      parts.push(new Blob([bytes]));
+      for (size += bytes.length; size >= PART_BYTES;) cut(PART_BYTES);
+    },
+    end(whole) {
+      cut(size);
+      if (whole) put(address, at);
+    },
+    kept: (from) => cache.then((there) => there.match(part(from))).then(async (found) => found && new Uint8Array(await found.arrayBuffer()))
+      .catch(() => null),
+  };
 }
 
 /** Where a bundle's bytes come from, the same each time. */
 function sourceOf(bundle) {
   const bytesOf = async () => await (await installedFile(SCOPE, bundle.file))?.arrayBuffer() ?? new ArrayBuffer(0);
-  return bundle.source ??= bundle.installed ? bytesOf : () => new Source(bundle.file, copyOf(bundle.file));
+  return bundle.source ??= bundle.installed ? bytesOf : async () => new Source(bundle.file, await copyOf(bundle.file));
 }
 
 /** The chosen bundle, once: begun before the visitor starts, and waited for then. */
@@ -325,17 +351,18 @@ async function forget() {
   $('forget').disabled = true;
 }
 
-/** Keeps the page for visits without a network, once it has what it needs now. */
-function keep() {
+/** Keeps the page for visits without a network; whole: and its bundles, once it has what it needs now. */
+function keep(whole) {
   if (!canKeep()) return;
-  keeping = navigator.serviceWorker.register('sw.js').then(({ active }) => active && new Promise((resolve) => {
+  keeping = navigator.serviceWorker.register('sw.js').then(({ active, waiting, installing }) => whole && new Promise((resolve) => {
     const { port1, port2 } = new MessageChannel();
     port1.onmessage = resolve;
-    active.postMessage('keep', [port2]);
+    (active ?? waiting ?? installing).postMessage('keep', [port2]);
   })).catch(() => {});  // the page works without it, but not offline
 }
 
 adopt(document, BASE);
 listen();
 const prepared = prepare();
-prepared.catch(tellUnprepared).then(() => loading).then(() => viewer.whole).then(() => brought).catch(() => {}).then(keep);
+prepared.catch(tellUnprepared).then(() => loading).then(() => keep()).then(() => viewer.whole).then(() => brought).catch(() => {})
+  .then(() => keep(true));

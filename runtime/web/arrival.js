@@ -1,6 +1,6 @@
 // A bundle on its way: a raw one comes whole, a packed one (formats/shipping.md) piece by piece, in the order of need.
 import { ENTRY_BYTES, HEADER_BYTES } from './bundle.js';
-import { ModarError } from './engine.js';
+import { ModarError, release } from './engine.js';
 
 /** Times that something is asked for again, and seconds before the second time: a phone's connection breaks now and then. Where one request in ten fails, one piece in a thousand is missing. */
 const TRIES = 3;
@@ -19,6 +19,13 @@ const PACKED_RECORD = 7;
  * when these are there, arrives when the engine runs, and is unpacked as fast as it comes. Set by hand.
  */
 const START = 40 << 10;
+/**
+ * Bytes that are asked for at once after that: a browser's memory takes what comes faster than it is unpacked, on a good line all of it.
+ * The next ones take a round trip more. Set by hand.
+ */
+const MOST_ASKED = 4 << 20;
+/** Bytes of a file of which a part came: it says itself how many, soon. */
+const UNKNOWN = 1e15;
 /** What pieces are needed for: to find patterns, to show each model as coarse as there is, all else. */
 export const STAGE = { find: 1, show: 2, refine: 3 };
 
@@ -71,8 +78,8 @@ export class Source {
   onProgress = null;
 
   /**
-   * bundle: an address, or bytes. copy: add(bytes) is given what is taken, in order, and does not change it; then end(whole) is called
-   * once. whole: those bytes are all of a packed bundle, and verified.
+   * bundle: an address, or bytes. copy: add(bytes) is given what is taken, in order, and copies it at once; then end(whole) is called
+   * once. whole: those bytes are all of a packed bundle, and verified. kept(from): what an earlier copy has from a place on, if anything.
    */
   constructor(bundle, copy = null) {
     this.#given = typeof bundle !== 'string' && !(bundle instanceof URL);
@@ -88,17 +95,21 @@ export class Source {
 
   /** A reader of all from a place on. again: past what the browser has kept of it. */
   async #open(from, again) {
-    if (this.#given) {
-      this.total = this.#bundle.length;
-      return { reader: { read: async () => ({ done: true }), cancel: async () => {} }, chunk: this.#bundle.subarray(from) };
+    const chunk = this.#given ? this.#bundle.subarray(from) : !again && await this.#copy?.kept(from);
+    if (chunk) {
+      const end = from + chunk.length;
+      this.#stops.push(end);
+      this.total ||= this.#given ? end : UNKNOWN;
+      return { reader: { read: async () => ({ done: true }), cancel: async () => {} }, chunk };
     }
     const { signal } = this.#abort;
-    const end = this.#stops.find((stop) => stop > from);
+    let end = this.#stops.find((stop) => stop > from);
+    if (!end && this.#stops.length > 0) this.#stops.push(end = from + MOST_ASKED);
     const headers = from > 0 || end ? { Range: `bytes=${from}-${end ? end - 1 : ''}` } : {};
     const response = await fetch(this.#bundle, { signal, headers, cache: again ? 'no-store' : 'default' })
       .catch(() => { throw this.#failed('the bundle could not be loaded'); });
     if (!response.ok) throw Object.assign(this.#failed(`the server answered ${response.status}`), { final: response.status < 500 });
-    this.total ||= from + (Number(response.headers.get('content-length')) || 0);
+    this.total ||= end ? UNKNOWN : from + (Number(response.headers.get('content-length')) || 0);  // of a part, the bundle says it
     let reader = response.body.getReader();
     if (response.status === 206 && end && end === this.#stops[0]) {
       reader = eager(reader, () => {
@@ -139,10 +150,10 @@ export class Source {
 
   /**
    * The next bytes, so many or to the end; whole: it is an error where they are fewer. onPart(at, bytes): is told of parts as they
-   * come, where they are more than one. before: what was taken of them already.
+   * come, where they are more than one.
    */
-  async take(count, whole = true, onPart = null, before = []) {
-    const parts = [...before];
+  async take(count, whole = true, onPart = null) {
+    const parts = [], spent = [];
     let size = 0;
     for (let tries = 0; size < count;) {
       if (this.#chunk.length === 0) {
@@ -164,6 +175,7 @@ export class Source {
       }
       const part = this.#chunk.subarray(0, count - size);
       this.#chunk = this.#chunk.subarray(part.length);
+      if (!this.#given && this.#chunk.length === 0) spent.push(part);
       parts.push(part);
       if (onPart && part.length < count) onPart(size, part);
       size += part.length;
@@ -171,7 +183,9 @@ export class Source {
       this.#copy?.add(part);
       this.onProgress?.(this.#taken, Math.max(this.total, this.#taken));
     }
-    return joined(parts);
+    const bytes = joined(parts);
+    release(...spent);
+    return bytes;
   }
 
   /** The same file from a place on, once more. */

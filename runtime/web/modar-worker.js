@@ -1,5 +1,5 @@
 // What a worker does: one engine that tracks. modar.js sends it one frame at a time.
-import { Engine, ModarError } from './engine.js';
+import { Engine, ModarError, release } from './engine.js';
 
 /** Share of the focal length below which its spread makes it worth keeping for the next start. */
 const KNOWN_FOCAL = 0.03;
@@ -97,7 +97,9 @@ const answers = {
     return { type: 'begun' };
   },
   piece({ index, stored, size }) {
-    return { type: 'decoded', bytes: engine.decode(index, stored, size) };
+    const bytes = engine.decode(index, stored, size);
+    release(stored);
+    return { type: 'decoded', bytes };
   },
   camera(options) {
     camera = options;

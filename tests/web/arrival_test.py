@@ -17,6 +17,13 @@ from browser import CANVAS, Browser, Quiet  # noqa: E402
 from programs import COVER, POTTERY, QUICK, ProgramTest  # noqa: E402
 
 HEADER, PIECE = 64, 64
+
+
+def range_from(at):
+    """What is asked for after the first stages: MOST_ASKED of runtime/web/arrival.js."""
+    return f"bytes={at}-{at + (4 << 20) - 1}"
+
+
 # {before, coarse, whole: hashes of what is drawn; events; error}
 DRAW = """(async () => {
   const [{ load }, { View }] = await Promise.all([import('/modar.js'), import('/modar-view.js')]);
@@ -201,7 +208,7 @@ class Arrival(ProgramTest):
         address = json.loads((self.base / "site" / "site.json").read_text())["bundles"][0]["file"]
         first = int(address.rpartition("&first=")[2])
         self.assertEqual(first, next(at for at, _, stage in self.pieces if stage == 3))
-        for kind, asked in (("staged", ["bytes=0-40959", f"bytes=40960-{first - 1}", f"bytes={first}-"]), ("rangeless", ["bytes=0-40959"])):
+        for kind, asked in (("staged", ["bytes=0-40959", f"bytes=40960-{first - 1}", range_from(first)]), ("rangeless", ["bytes=0-40959"])):
             self.http.asked[kind] = ["before"] if kind == "rangeless" else []  # its first answer is cut short
             drawn = self.draw(f"'/{kind}/demo.packed?first={first}'")
             self.assertEqual((drawn.get("whole"), drawn["refined"]), (self.wanted["whole"], 2))
@@ -213,7 +220,8 @@ class Arrival(ProgramTest):
         self.browser.open(f"http://localhost:{self.http.server_port}/{kind}/")
         engine = "performance.getEntriesByType('resource').find(({ name }) => name.endsWith('/engine-simd.wasm'))"
         self.browser.wait(f"{engine}?.initiatorType === 'link'", "what index.html asks for before any script does", 30)
-        self.browser.wait("navigator.serviceWorker.ready.then(({ active }) => active.state === 'activated')", "the service worker")
+        self.browser.wait("""caches.keys().then(async (names) => names.filter((name) => name.includes(location.pathname)).length === 1 &&
+          Boolean(await caches.match('bundles/demo.packed', { ignoreSearch: true })))""", "the bundle is kept")
         kept = self.browser.run("""(async () => {
           const names = (await caches.keys()).filter((name) => name.includes(location.pathname));
           const bundle = await (await caches.open(names[0])).match('bundles/demo.packed', { ignoreSearch: true });
@@ -225,13 +233,13 @@ class Arrival(ProgramTest):
 
     def test_a_first_visit_brings_the_bundle_once_by_ranges(self):
         first = next(at for at, _, stage in self.pieces if stage == 3)
-        staged = ["bytes=0-40959", f"bytes=40960-{first - 1}", f"bytes={first}-"]
+        staged = ["bytes=0-40959", f"bytes=40960-{first - 1}", range_from(first)]
         asked, sent = self.visit("visited")
         print(f"a first visit, with what the service worker fetches: {len(asked)} requests, {sent} bytes of a bundle of {len(self.http.packed)}")
         self.assertEqual((asked, sent), (staged, len(self.http.packed)))
         # Of what was damaged on the way, no copy is kept: the worker brings its own.
         asked, _ = self.visit("mended")
-        self.assertEqual(asked[:-1], [*staged, f"bytes={self.http.swapped[1][0]}-"])
+        self.assertEqual(asked[:-1], [*staged, range_from(self.http.swapped[1][0])])
         self.assertIn(asked[-1], (None, "bytes=0-"))  # the browser's own range, of what it has in part
 
     def test_bytes_in_hand_and_lost_contexts(self):

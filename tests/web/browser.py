@@ -32,6 +32,9 @@ CANVAS = """const canvas = (width, height) => {
 PART = """globalThis.part = (id) => document.getElementById(id)
   ?? document.querySelector('modar-viewer').shadowRoot.getElementById(id)"""
 
+# Bytes of answers that the page's process keeps for whoever debugs it: as many as it would hold itself, without this.
+NOTHING_KEPT = {"maxTotalBufferSize": 1, "maxResourceBufferSize": 1}
+
 
 class Browser:
     """One browser with one page. Collects what a visitor's console and network would show."""
@@ -58,8 +61,9 @@ class Browser:
         self.line = None  # of throttle()
         target = next(t for t in self.call("Target.getTargets")["targetInfos"] if t["type"] == "page")
         self.session = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)["sessionId"]
-        for domain in ("Page", "Runtime", "Log", "Network", "Accessibility"):
+        for domain in ("Page", "Runtime", "Log", "Accessibility"):
             self.call(domain + ".enable")
+        self.call("Network.enable", **NOTHING_KEPT)
         self.call("Page.addScriptToEvaluateOnNewDocument", source=PART)
 
     def _message(self):
@@ -84,7 +88,7 @@ class Browser:
         elif method == "Network.requestWillBeSent":
             self.requests.append(params["request"]["url"])
         elif method == "Target.attachedToTarget" and self.line:  # a worker, which waits
-            for command, words in (("Network.enable", {}), ("Network.emulateNetworkConditions", self.line), ("Runtime.runIfWaitingForDebugger", {})):
+            for command, words in (("Network.enable", NOTHING_KEPT), ("Network.emulateNetworkConditions", self.line), ("Runtime.runIfWaitingForDebugger", {})):
                 self._send(params["sessionId"], command, words)
 
     def _send(self, session, method, params):
@@ -212,8 +216,8 @@ class Counted(Quiet):
 class Server:
     """self.http.answered: (path, status) of each request."""
 
-    def __init__(self, folder):
-        self.http = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Counted, directory=str(folder)))
+    def __init__(self, folder, handler=Counted):
+        self.http = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(handler, directory=str(folder)))
         self.http.answered = []
         self.url = f"http://localhost:{self.http.server_port}/"
         threading.Thread(target=self.http.serve_forever, daemon=True).start()

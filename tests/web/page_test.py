@@ -12,11 +12,12 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import unittest
 import urllib.parse
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
-from browser import Browser, Server, axe_core  # noqa: E402
+from browser import Browser, Counted, Server, axe_core  # noqa: E402
 from programs import (COVER, COVERED, POTTERY, QUICK, READINGS, ROOT, TURNED, TURNS, ProgramTest, covered_clip,  # noqa: E402
                       demo_clip, picture, write_turns)
 
@@ -25,6 +26,32 @@ PAGE = ROOT / "build" / "web" / "web"
 WIDTH, HEIGHT, FRAMES = 640, 480, 6
 # A folder that keeps the pictures, for people.
 KEEP = os.environ.get("MODAR_WEB_PICTURES")
+
+class Breaking(Counted):
+    """Has ranges. While server.most is not None, it sends bundles up to that byte, and nothing more until server.over. server.gone: it
+    answers nothing."""
+
+    def do_GET(self):
+        if self.server.gone:
+            self.close_connection = True
+            return None
+        if ".packed" not in self.path:
+            return super().do_GET()
+        body = pathlib.Path(self.translate_path(self.path)).read_bytes()
+        start, _, last = self.headers.get("Range", "bytes=0-").removeprefix("bytes=").partition("-")
+        self.server.starts.append(int(start))
+        body, most = body[:int(last) + 1 if last else None], self.server.most
+        self.send_response(206)
+        self.send_header("Content-Length", len(body) - int(start))
+        self.send_header("Content-Range", f"bytes {start}-{len(body) - 1}/*")
+        self.end_headers()
+        try:
+            self.wfile.write(body[int(start):most])
+            if most is not None:
+                self.server.over.wait(60)
+        except OSError:
+            pass  # the visit has ended
+
 
 FEED = """(async () => {
   const { load } = await import('/modar.js');
@@ -970,7 +997,7 @@ class Page(ProgramTest):
     def test_without_the_server_the_second_visit_works(self):
         self.browser.resize(640, 480)
         self.browser.open(self.server.url)
-        self.browser.wait("navigator.serviceWorker.ready.then(() => caches.match('words/en.json')).then(Boolean)", "the service worker")
+        self.browser.wait("caches.match('bundles/demo.packed', { ignoreSearch: true }).then(Boolean)", "what is kept")
         type(self).server.close()
         try:
             self.browser.open(self.server.url + "?again")
@@ -983,11 +1010,48 @@ class Page(ProgramTest):
         server = Server(self.site)  # another origin: nothing of it is stored yet
         self.addCleanup(server.close)
         self.browser.open(server.url)
-        self.browser.wait("navigator.serviceWorker.ready.then(() => true)", "the service worker")
+        self.browser.wait("caches.match('bundles/demo.packed', { ignoreSearch: true }).then(Boolean)", "what is kept")
         brought = [path for path, _ in server.http.answered if path.startswith("/bundles/")]
         self.assertEqual(len(brought), 1, server.http.answered)
         kept = "caches.keys().then(async (names) => (await caches.match('bundles/demo.packed', { ignoreSearch: true }))?.ok)"
         self.assertTrue(self.browser.run(kept))
+
+    def test_visits_after_one_that_was_broken_off_go_on(self):
+        part = 1 << 14
+        site = self.folder / "parts"
+        shutil.copytree(self.site, site)
+        script = (site / "app.js").read_text()
+        self.assertEqual(script.count("=1e6"), 1)
+        (site / "app.js").write_text(script.replace("=1e6", f"={part}"))  # the bundle is small
+        server = Server(site, Breaking)
+        self.addCleanup(server.close)
+        address = json.loads((site / "site.json").read_text())["bundles"][0]["file"]
+        packed = (site / address.partition("?")[0]).read_bytes()
+        first = int(address.rpartition("=")[2])
+        server.http.starts, server.http.most, server.http.over, server.http.gone = [], (first + len(packed)) // 2, threading.Event(), False
+        self.addCleanup(server.http.over.set)
+        kept = f"caches.open('modar {server.url} brought').then((cache) => cache.keys()).then(({{ length }}) => length)"
+        self.browser.open(server.url)
+        self.browser.wait(f"{kept}.then((count) => count === {(first + len(packed)) // 2 // part})", "parts that are kept")
+        self.browser.wait("navigator.serviceWorker.ready.then(() => true)", "the service worker")
+        # Without a network what came is shown.
+        self.browser.open("about:blank")
+        server.http.over.set()
+        server.http.gone = True
+        self.browser.open(server.url + "?offline")
+        self.start()
+        whole = "document.getElementById('viewer').whole.then(() => true)"
+        self.assertFalse(self.browser.run(f"Promise.race([{whole}, new Promise((done) => setTimeout(done, 100))])"))
+        self.browser.open("about:blank")
+        server.http.starts, server.http.most, server.http.gone = [], None, False
+        self.browser.open(server.url + "?again")
+        self.start()
+        self.browser.wait(f"caches.match('{address}').then(Boolean)", "the bundle is kept")
+        self.assertEqual(server.http.starts[0], (first + len(packed)) // 2 // part * part)
+        self.assertEqual(server.http.starts, sorted(set(server.http.starts)), "asked for what was missing, once")
+        hashed = self.browser.run(f"""caches.match('{address}').then((kept) => kept.arrayBuffer())
+          .then((bytes) => crypto.subtle.digest('SHA-256', bytes)).then((hash) => Array.from(new Uint8Array(hash)))""")
+        self.assertEqual(bytes(hashed), hashlib.sha256(packed).digest())
 
     def test_the_package_installs_and_three_js_draws_on_a_picture(self):
         npm, project = shutil.which("npm"), self.site / "project"
