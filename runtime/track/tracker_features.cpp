@@ -225,11 +225,11 @@ std::array<Point, 2 * kTests> test_points() {
     constexpr int kAbove = 4 * kTestRadius;
     return static_cast<int>(value + (kAbove + 0.5)) - kAbove;
   };
-  std::vector<std::int32_t> offsets;
-  offsets.reserve(static_cast<std::size_t>(kAngles) * points.size());
+  std::vector<std::int32_t> offsets(static_cast<std::size_t>(kAngles) * points.size());
+  std::int32_t* next_offset = offsets.data();
   for (int angle = 0; angle < kAngles; ++angle) {
     for (const Point& p : points) {
-      offsets.push_back(nearest(s * p.x + c * p.y) * stride + nearest(c * p.x - s * p.y));
+      *next_offset++ = nearest(s * p.x + c * p.y) * stride + nearest(c * p.x - s * p.y);
     }
     const double next = c * kCos - s * kSin;
     s = c * kSin + s * kCos;

@@ -22,6 +22,8 @@ from studio import StudioTest  # noqa: E402
 # A folder that keeps a picture of every step, for people.
 KEEP = os.environ.get("MODAR_WEB_PICTURES")
 MOST_CLICKS = 12
+# Where the bake's quality is not what is looked at: few views of a pattern, no score but the page's.
+QUICK = '[bake]\nloop-views = 8\nscore = false\nparameters = ["none"]\n\n'
 SIDE = 60  # cut from each side of the photo
 
 AXE = """axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] })
@@ -315,6 +317,8 @@ class Page(StudioTest):
 
     def test_the_same_by_keys_alone(self):
         files = self.files()
+        self.project.mkdir()
+        (self.project / "modar.toml").write_text(QUICK)
         self.start()
         hand = self.hand
         hand.call("Page.setInterceptFileChooserDialog", enabled=True)
@@ -373,7 +377,7 @@ class Page(StudioTest):
         self.project.mkdir()
         for file in self.files():
             shutil.copy(file, self.project)
-        (self.project / "modar.toml").write_text('[[pattern]]\nfile = "wall.jpg"\n\n[[model]]\nfile = "pottery.obj"\n\n[[scene]]\npattern = "wall"\nmodel = "pottery"\n')
+        (self.project / "modar.toml").write_text(QUICK + '[[pattern]]\nfile = "wall.jpg"\n\n[[model]]\nfile = "pottery.obj"\n\n[[scene]]\npattern = "wall"\nmodel = "pottery"\n')
         address = self.studio(self.project).address
         self.fox = fox = Fox(self.folder / "fox")
         self.addCleanup(fox.close)
@@ -420,7 +424,7 @@ class Page(StudioTest):
         picture(self.project / "band.png")
         picture(self.project / "twin.png")
         shutil.copy(POTTERY, self.project)
-        (self.project / "modar.toml").write_text('[[pattern]]\nfile = "*.png"\n\n[[model]]\nfile = "pottery.obj"\n\n[[scene]]\npattern = "band"\nmodel = "pottery"\n')
+        (self.project / "modar.toml").write_text(QUICK + '[[pattern]]\nfile = "*.png"\n\n[[model]]\nfile = "pottery.obj"\n\n[[scene]]\npattern = "band"\nmodel = "pottery"\n')
         self.start()
         hand = self.hand
         hand.run("location.hash = '#/picture/band'")
@@ -454,7 +458,7 @@ class Page(StudioTest):
         self.project.mkdir()
         picture(self.project / "band.png", 480, 360)
         shutil.copy(POTTERY, self.project)
-        (self.project / "modar.toml").write_text('[[pattern]]\nfile = "band.png"\nshape = "cylinder,diameter=80mm,arc=150"\n\n'
+        (self.project / "modar.toml").write_text(QUICK + '[[pattern]]\nfile = "band.png"\nshape = "cylinder,diameter=80mm,arc=150"\n\n'
                                                  '[[model]]\nfile = "pottery.obj"\n\n[[scene]]\npattern = "band"\nmodel = "pottery"\n')
         can(self.project / "band.png", self.folder / "can.png", diameter=80, arc=150)
         walk(self.folder / "can.png", self.folder / "walk.mp4")
@@ -513,7 +517,7 @@ class Page(StudioTest):
         self.project.mkdir()
         picture(self.project / "cover.png")
         shutil.copy(POTTERY, self.project)
-        (self.project / "modar.toml").write_text('[[pattern]]\nfile = "cover.png"\n\n[[model]]\nfile = "pottery.obj"\n\n[[scene]]\npattern = "cover"\nmodel = "pottery"\n')
+        (self.project / "modar.toml").write_text(QUICK + '[[pattern]]\nfile = "cover.png"\n\n[[model]]\nfile = "pottery.obj"\n\n[[scene]]\npattern = "cover"\nmodel = "pottery"\n')
         for name, data in (("IMG_1.HEIC", b"ftypheic"), ("vase.fbx", b"Kaydara"), ("broken.obj", b"hello\n")):
             (self.source / name).write_bytes(data)
         self.start()
