@@ -187,29 +187,27 @@ class Decimator {
             std::span<const std::uint8_t> locked, const DecimateLimits& limits)
       : vertices_(vertices),
         limits_(limits),
-        first_(vertices.positions.size(), kNoIndex),
-        kinds_(vertices.positions.size(), Kind::kLocked),
+        all_(vertices.positions.size()),
         quadrics_(vertices.positions.size()),
-        own_(vertices.positions.size()),
-        best_(vertices.positions.size()),
-        marks_(vertices.positions.size(), 0),
         queue_(vertices.positions.size()),
         removed_(vertices, indices.size() / 3) {
+    for (std::size_t v = 0; v < all_.size(); ++v) all_[v].position = vertices.positions[v];
     add_triangles(indices);
     for (std::uint32_t v = 0; v < locked.size(); ++v) {
       const Kind kind = kind_of(static_cast<std::uint16_t>(v));
-      if (locked[v] == 0) kinds_[v] = kind;
+      if (locked[v] == 0) all_[v].kind = kind;
     }
     for (std::uint32_t v = 0; v < vertices.twins.size(); ++v) {
       const std::uint16_t twin = vertices.twins[v];
-      if (twin == kNoTwin || (kinds_[v] == Kind::kRim && kinds_[twin] == Kind::kRim)) continue;
-      kinds_[v] = kinds_[twin] = Kind::kLocked;
+      if (twin == kNoTwin) continue;
+      if (all_[v].kind == Kind::kRim && all_[twin].kind == Kind::kRim) continue;
+      all_[v].kind = all_[twin].kind = Kind::kLocked;
     }
   }
 
   CollapseSequence run() {
-    for (std::uint16_t v = 0; v < first_.size(); ++v) own_[v] = quadrics_[v].at(position(v));
-    for (std::uint32_t v = 0; v < first_.size(); ++v) {
+    for (std::size_t v = 0; v < all_.size(); ++v) all_[v].take(quadrics_[v]);
+    for (std::size_t v = 0; v < all_.size(); ++v) {
       if (const auto w = static_cast<std::uint16_t>(v); first_of(w) == w) estimate(w);
     }
     while (alive_count_ > limits_.least_triangles && step()) continue;
@@ -237,6 +235,21 @@ class Decimator {
     bool exact = false;
     bool least = false;  ///< no other has a lower price by the quadrics
   };
+  /// What is asked of each neighbour, in one line of the cache.
+  struct alignas(64) Vertex {
+    glm::dvec3 position{0.0};
+    double own = 0;  ///< its quadric there
+    double area = 0;
+    std::uint32_t first = kNoIndex;  ///< its first corner
+    std::uint32_t mark = 0;
+    Best best;
+    Kind kind = Kind::kLocked;
+
+    void take(const Quadric& quadric) {
+      own = quadric.at(position);
+      area = quadric.area;
+    }
+  };
   /// A vertex' way to a neighbour, and its twin's to the same place.
   struct Move {
     double price = 0;
@@ -246,7 +259,7 @@ class Decimator {
       return std::tie(price, to) < std::tie(other.price, other.to);
     }
   };
-  [[nodiscard]] const glm::dvec3& position(std::uint16_t v) const { return vertices_.positions[v]; }
+  [[nodiscard]] const glm::dvec3& position(std::uint16_t v) const { return all_[v].position; }
   [[nodiscard]] std::uint16_t twin(std::uint16_t v) const {
     return vertices_.twins.empty() ? kNoTwin : vertices_.twins[v];
   }
@@ -264,8 +277,8 @@ class Decimator {
       Quadric plane;
       if (twice > 0) plane = Quadric::of_plane(cross / twice, origin, 0.5 * twice);
       for (std::uint32_t k = 0; k < 3; ++k) {
-        corners_.push_back({first_[t[k]], t[(k + 1) % 3], t[(k + 2) % 3]});
-        first_[t[k]] = first_corner + k;
+        corners_.push_back({all_[t[k]].first, t[(k + 1) % 3], t[(k + 2) % 3]});
+        all_[t[k]].first = first_corner + k;
         quadrics_[t[k]] += plane;
       }
     }
@@ -275,7 +288,7 @@ class Decimator {
   /// Calls back with the corner of each triangle at v and the two vertices that follow v in it.
   template <typename Callback>
   void around(std::uint16_t v, const Callback& callback) {
-    std::uint32_t* link = &first_[v];
+    std::uint32_t* link = &all_[v].first;
     while (*link != kNoIndex) {
       const std::uint32_t number = *link;
       Corner& corner = corners_[number];
@@ -296,17 +309,17 @@ class Decimator {
     bool twice = false;
     around(v, [&](std::uint32_t, std::uint16_t a, std::uint16_t b) {
       fan_.emplace_back(a, b);
-      twice = twice || marks_[b] == mark_;
-      marks_[b] = mark_;
+      twice = twice || all_[b].mark == mark_;
+      all_[b].mark = mark_;
     });
     if (fan_.empty()) return Kind::kLocked;
     std::sort(fan_.begin(), fan_.end());
     std::pair<std::uint16_t, std::uint16_t> start = fan_[0];
     for (std::size_t i = 0; i < fan_.size(); ++i) {
       twice = twice || (i > 0 && fan_[i].first == fan_[i - 1].first);
-      if (marks_[fan_[i].first] != mark_) start = fan_[i];  // no triangle before it
+      if (all_[fan_[i].first].mark != mark_) start = fan_[i];  // no triangle before it
     }
-    const bool open = marks_[start.first] != mark_;
+    const bool open = all_[start.first].mark != mark_;
     std::size_t steps = 0;
     for (std::uint16_t at = start.first; steps < fan_.size(); ++steps) {
       const auto next = std::lower_bound(fan_.begin(), fan_.end(), std::pair(at, std::uint16_t{0}));
@@ -337,7 +350,7 @@ class Decimator {
   /// Calls back with each vertex that v may collapse to: its neighbours, on a rim those of the rim.
   template <typename Callback>
   void targets_of(std::uint16_t v, const Callback& callback) {
-    if (kinds_[v] == Kind::kInside) {
+    if (all_[v].kind == Kind::kInside) {
       around(v, [&](std::uint32_t, std::uint16_t u, std::uint16_t) { callback(u); });
       return;
     }
@@ -356,8 +369,8 @@ class Decimator {
   /// root has the least rms (2.21e-4 of the diagonal; sum 2.27, mean 2.26 at 0.7) and a greatest
   /// error between (1.8e-3; 2.6, 1.5).
   [[nodiscard]] double price_of(std::uint16_t v, std::uint16_t u) const {
-    const double sum = quadrics_[v].at(position(u)) + own_[u];
-    const double area = quadrics_[v].area + quadrics_[u].area;
+    const double sum = quadrics_[v].at(position(u)) + all_[u].own;
+    const double area = all_[v].area + all_[u].area;
     return area > 0 ? std::max(0.0, sum) / std::sqrt(area) : 0.0;
   }
 
@@ -384,16 +397,16 @@ class Decimator {
 
   /// Queues the cheapest collapse of v by the quadrics alone.
   void estimate(std::uint16_t v) {
-    if (kinds_[v] == Kind::kLocked) return;
+    if (all_[v].kind == Kind::kLocked) return;
     list_moves(v);
     const auto least = std::min_element(moves_.begin(), moves_.end());
-    best_[v].to = v;
+    all_[v].best.to = v;
     if (least == moves_.end()) return queue_.remove(v);
     queue(v, {static_cast<float>(least->price), least->to, least->across, false, true});
   }
 
   void queue(std::uint16_t v, const Best& best) {
-    best_[v] = best;
+    all_[v].best = best;
     queue_.put(v, best.price);
   }
 
@@ -402,8 +415,8 @@ class Decimator {
     while (true) {
       const std::uint16_t v = queue_.take_front();
       if (v == PriceQueue::kNone) return false;
-      if (!best_[v].exact && !find_legal(v)) continue;
-      const Best best = best_[v];
+      if (!all_[v].best.exact && !find_legal(v)) continue;
+      const Best best = all_[v].best;
       if (queue_.has_below(best.price)) {
         queue(v, best);
         continue;
@@ -417,9 +430,9 @@ class Decimator {
   /// Finds the cheapest legal collapse of v, exactly priced.
   bool find_legal(std::uint16_t v) {
     // Without uvs the quadrics tell the whole price.
-    if (best_[v].least && vertices_.uvs.empty() && twin(v) == kNoTwin &&
-        legal_price(v, best_[v].to)) {
-      best_[v].exact = true;
+    if (all_[v].best.least && vertices_.uvs.empty() && twin(v) == kNoTwin &&
+        legal_price(v, all_[v].best.to)) {
+      all_[v].best.exact = true;
       return true;
     }
     list_moves(v);
@@ -439,21 +452,21 @@ class Decimator {
       best.price = *price;
     }
     const bool least = !moves_.empty() && best.to == moves_[0].to;
-    best_[v] = {static_cast<float>(best.price), best.to, best.across, true, least};
+    all_[v].best = {static_cast<float>(best.price), best.to, best.across, true, least};
     return best.to != v;
   }
 
   /// The exact price of a collapse; nothing where it is not allowed.
   std::optional<double> legal_price(std::uint16_t v, std::uint16_t u) {
     double price = price_of(v, u);
-    const double root = std::sqrt(quadrics_[v].area + quadrics_[u].area);
+    const double root = std::sqrt(all_[v].area + all_[u].area);
     if (price > limits_.max_error * limits_.max_error * root) return std::nullopt;
     if (folds(v, u) || turns(v, u)) return std::nullopt;
     if (vertices_.uvs.empty()) return price;
     const double shift = shift_after(v, u);
     if (shift > limits_.max_uv_shift) return std::nullopt;
     const double slide = shift * limits_.length_of_uv;
-    price += kShiftWeight * quadrics_[v].area * slide * slide / root;
+    price += kShiftWeight * all_[v].area * slide * slide / root;
     return price;
   }
 
@@ -464,14 +477,14 @@ class Decimator {
     int between = 0;
     int others = 0;
     around(v, [&](std::uint32_t, std::uint16_t a, std::uint16_t b) {
-      marks_[a] = marks_[b] = mark_;
+      all_[a].mark = all_[b].mark = mark_;
       ++(a == u || b == u ? between : others);
     });
-    marks_[u] = 0;
+    all_[u].mark = 0;
     int common = 0;
     const auto count = [&](std::uint16_t w) {
-      if (marks_[w] != mark_) return;
-      marks_[w] = 0;
+      if (all_[w].mark != mark_) return;
+      all_[w].mark = 0;
       ++common;
     };
     around(u, [&](std::uint32_t, std::uint16_t a, std::uint16_t b) { count(a), count(b); });
@@ -537,14 +550,14 @@ class Decimator {
       last = corner;
     });
     if (last != kNoIndex) {
-      corners_[last].next = first_[u];
-      first_[u] = first_[v];
+      corners_[last].next = all_[u].first;
+      all_[u].first = all_[v].first;
     }
-    first_[v] = kNoIndex;
-    kinds_[v] = Kind::kLocked;
+    all_[v].first = kNoIndex;
+    all_[v].kind = Kind::kLocked;
     removed_.reattach(kept_);
     quadrics_[u] += quadrics_[v];
-    own_[u] = quadrics_[u].at(position(u));
+    all_[u].take(quadrics_[u]);
     const float before = sequence_.prices.empty() ? 0.0f : sequence_.prices.back();
     sequence_.collapses.push_back({v, u});
     sequence_.prices.push_back(std::max(before, price));
@@ -564,10 +577,10 @@ class Decimator {
     ++mark_;
     for (const std::uint16_t neighbour : ring_) {
       const std::uint16_t w = first_of(neighbour);
-      if (std::exchange(marks_[w], mark_) == mark_) continue;
-      Best& best = best_[w];
+      if (std::exchange(all_[w].mark, mark_) == mark_) continue;
+      Best& best = all_[w].best;
       const bool known = w != first_of(u) && best.to != w && !aims_at(w, u) && !aims_at(w, v);
-      if (kinds_[w] != Kind::kInside || !known) {
+      if (all_[w].kind != Kind::kInside || !known) {
         estimate(w);
       } else if (const auto price = static_cast<float>(price_of(w, u)); price < best.price) {
         queue(w, {price, u, kNoTwin, false, best.least});
@@ -578,7 +591,7 @@ class Decimator {
   }
 
   [[nodiscard]] bool aims_at(std::uint16_t a, std::uint16_t u) const {
-    const Best& best = best_[first_of(a)];
+    const Best& best = all_[first_of(a)].best;
     return best.to == u || best.across == u;
   }
 
@@ -586,12 +599,8 @@ class Decimator {
   DecimateLimits limits_;
   std::vector<Corner> corners_;  // three a triangle
   std::size_t alive_count_ = 0;
-  std::vector<std::uint32_t> first_;  // of each vertex: its first corner
-  std::vector<Kind> kinds_;
-  std::vector<Quadric> quadrics_;
-  std::vector<double> own_;  // of each vertex: its quadric there
-  std::vector<Best> best_;
-  std::vector<std::uint32_t> marks_;
+  std::vector<Vertex> all_;
+  std::vector<Quadric> quadrics_;  // of each vertex
   std::uint32_t mark_ = 0;
   PriceQueue queue_;
   RemovedVertexMap removed_;

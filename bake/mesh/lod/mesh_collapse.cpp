@@ -21,9 +21,6 @@ constexpr double kSlideWeight = 1.0;
 /// are nearly parallel it may be anywhere. Swept on the same: 0.730, 0.732 and 0.732 with 0.75, 1.5
 /// and 3.
 constexpr double kFarthest = 1.5;
-std::array<glm::dvec3, 3> corners_of(const CollapseMesh& mesh, const CollapseFace& face) {
-  return {mesh.places[face.places[0]], mesh.places[face.places[1]], mesh.places[face.places[2]]};
-}
 
 std::uint32_t root_of(std::vector<std::pair<std::uint32_t, std::uint32_t>>& joined,
                       std::uint32_t id) {
@@ -40,33 +37,43 @@ MeshCollapser::MeshCollapser(CollapseMesh mesh)
       alive_(mesh_.faces.size(), 1),
       left_(mesh_.faces.size()),
       alive_count_(mesh_.faces.size()),
-      first_(mesh_.places.size(), kNoIndex),
-      quadrics_(mesh_.places.size()),
-      borders_(mesh_.places.size(), 0),
-      versions_(mesh_.places.size(), 0),
+      places_(mesh_.places.size()),
+      corners_(3 * mesh_.faces.size()),
       parents_(mesh_.places.size()),
-      several_(mesh_.places.size(), 0),
       marks_(mesh_.places.size(), 0) {
   std::iota(parents_.begin(), parents_.end(), 0u);
   std::iota(left_.begin(), left_.end(), 0u);
+  for (std::size_t i = 0; i < places_.size(); ++i) places_[i].point = mesh_.places[i];
+  mesh_.places = {};
   link_faces();
-  for (std::uint32_t place = 0; place < borders_.size(); ++place) {
-    borders_[place] = is_open(place) ? 1 : 0;
-  }
   price_faces();
 }
 
 void MeshCollapser::link_faces() {
-  next_.resize(3 * mesh_.faces.size());
   for (std::uint32_t f = 0; f < mesh_.faces.size(); ++f) {
+    const auto& at = mesh_.faces[f].places;
     for (std::uint32_t k = 0; k < 3; ++k) {
       const std::uint32_t corner = 3 * f + k;
-      next_[corner] = std::exchange(first_[mesh_.faces[f].places[k]], corner);
+      const std::array<std::uint32_t, 2>& others = kOtherCorners[k];
+      corners_[corner] = {std::exchange(places_[at[k]].first, corner), at[others[0]],
+                          at[others[1]]};
     }
   }
-  for (std::uint32_t place = 0; place < mesh_.places.size(); ++place) {
-    several_[place] = has_several_looks(place) ? 1 : 0;
+  for (std::uint32_t place = 0; place < places_.size(); ++place) {
+    places_[place].several = has_several_looks(place);
+    places_[place].open = is_open(place);
   }
+}
+
+std::array<glm::dvec3, 3> MeshCollapser::corners_of(const CollapseFace& face) const {
+  const auto& at = face.places;
+  return {places_[at[0]].point, places_[at[1]].point, places_[at[2]].point};
+}
+
+void MeshCollapser::remove(std::uint32_t f) {
+  for (std::uint32_t k = 0; k < 3; ++k) corners_[3 * f + k].leave();
+  alive_[f] = 0;
+  --alive_count_;
 }
 
 void MeshCollapser::forget() {
@@ -75,8 +82,8 @@ void MeshCollapser::forget() {
   // Collapses make no border where there was none.
   for (const std::uint32_t f : left_) {
     for (const std::uint32_t place : mesh_.faces[f].places) {
-      quadrics_[place] = {};
-      if (borders_[place] != 0) borders_[place] = is_open(place) ? 1 : 0;
+      places_[place].quadric = {};
+      places_[place].open = places_[place].open && is_open(place);
     }
   }
   price_faces();
@@ -85,16 +92,16 @@ void MeshCollapser::forget() {
 /// Sums up the quadrics of what is left.
 void MeshCollapser::price_faces() {
   for (const std::uint32_t f : left_) {
-    const std::array<glm::dvec3, 3> t = corners_of(mesh_, mesh_.faces[f]);
+    const std::array<glm::dvec3, 3> t = corners_of(mesh_.faces[f]);
     const glm::dvec3 cross = glm::cross(t[1] - t[0], t[2] - t[0]);
     const double twice = glm::length(cross);
     const std::array<std::uint32_t, 3>& at = mesh_.faces[f].places;
     if (twice > 0) {
       const Quadric plane = Quadric::of_plane(cross / twice, t[0], 0.5 * twice);
-      for (const std::uint32_t place : at) quadrics_[place] += plane;
+      for (const std::uint32_t place : at) places_[place].quadric += plane;
     }
     for (std::uint32_t k = 0; k < 3; ++k) {
-      if (borders_[at[k]] != 0 && borders_[at[(k + 1) % 3]] != 0) add_border(f, k);
+      if (places_[at[k]].open && places_[at[(k + 1) % 3]].open) add_border(f, k);
     }
   }
 }
@@ -123,32 +130,31 @@ void MeshCollapser::add_border(std::uint32_t f, std::uint32_t k) {
   std::size_t count = 0;
   around(v, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) { count += a == w || b == w; });
   if (count != 1) return;
-  const glm::dvec3 edge = mesh_.places[w] - mesh_.places[v];
-  const glm::dvec3 third = mesh_.places[at[(k + 2) % 3]] - mesh_.places[v];
+  const glm::dvec3 edge = point_of(w) - point_of(v);
+  const glm::dvec3 third = point_of(at[(k + 2) % 3]) - point_of(v);
   const glm::dvec3 across = glm::cross(glm::cross(edge, third), edge);
   const double length = glm::length(across);
   if (!(length > 0)) return;
   const Quadric plane =
-      Quadric::of_plane(across / length, mesh_.places[v], kRimWeight * glm::dot(edge, edge));
-  quadrics_[v] += plane;
-  quadrics_[w] += plane;
+      Quadric::of_plane(across / length, point_of(v), kRimWeight * glm::dot(edge, edge));
+  places_[v].quadric += plane;
+  places_[w].quadric += plane;
 }
 
-/// Calls back with each triangle at a place, and the two places that follow it there.
+/// Calls back with each triangle at a place, by its corner there, and the two places that follow
+/// it.
 template <class Callback>
 void MeshCollapser::around(std::uint32_t place, const Callback& callback) {
-  std::uint32_t* link = &first_[place];
+  std::uint32_t* link = &places_[place].first;
   while (*link != kNoIndex) {
-    const std::uint32_t corner = *link;
-    const std::uint32_t f = corner / 3;
-    if (alive_[f] == 0) {
-      *link = next_[corner];
+    const std::uint32_t number = *link;
+    Corner& corner = corners_[number];
+    if (corner.is_gone()) {
+      *link = corner.next;
       continue;
     }
-    const auto& places = mesh_.faces[f].places;
-    const std::array<std::uint32_t, 2>& others = kOtherCorners[corner - 3 * f];
-    callback(f, places[others[0]], places[others[1]]);
-    link = &next_[corner];
+    callback(number, corner.a, corner.b);
+    link = &corner.next;
   }
 }
 
@@ -179,7 +185,8 @@ bool MeshCollapser::reduce_to(std::size_t triangles) {
       continue;
     }
     const Candidate best = queue_.take();
-    if (best.to_version != versions_[best.to] || best.from_version != versions_[best.from]) {
+    if (best.to_version != places_[best.to].version ||
+        best.from_version != places_[best.from].version) {
       continue;
     }
     if (const float price = loss_of(best.to, best.from); price > 0) {
@@ -210,7 +217,7 @@ void MeshCollapser::fill_queue(std::size_t collapses) {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t a = at[k];
       const std::uint32_t b = at[(k + 1) % 3];
-      if (a < b || (borders_[a] != 0 && borders_[b] != 0)) all.push_back(candidate(a, b));
+      if (a < b || (places_[a].open && places_[b].open)) all.push_back(candidate(a, b));
     }
   }
   queue_.fill(std::move(all), collapses);
@@ -220,7 +227,7 @@ MeshCollapser::Candidate MeshCollapser::candidate(std::uint32_t a, std::uint32_t
   const std::uint32_t to = std::min(a, b);
   const std::uint32_t from = std::max(a, b);
   const auto price = static_cast<float>(target_of(to, from).price);
-  return {price, to, from, versions_[to], versions_[from]};
+  return {price, to, from, places_[to].version, places_[from].version};
 }
 
 void MeshCollapser::push_around(std::uint32_t place) {
@@ -237,20 +244,19 @@ void MeshCollapser::push_around(std::uint32_t place) {
 bool MeshCollapser::has_several_looks(std::uint32_t place) {
   std::uint32_t seen = kNoIndex;
   bool several = false;
-  for (std::uint32_t corner = first_[place]; corner != kNoIndex; corner = next_[corner]) {
-    if (alive_[corner / 3] == 0) continue;
+  around(place, [&](std::uint32_t corner, std::uint32_t, std::uint32_t) {
     const std::uint32_t look = mesh_.faces[corner / 3].looks[corner % 3];
     several = several || (seen != kNoIndex && look != seen);
     seen = look;
-  }
+  });
   return several;
 }
 
 MeshCollapser::Target MeshCollapser::target_of(std::uint32_t a, std::uint32_t b) {
-  Quadric sum = quadrics_[a];
-  sum += quadrics_[b];
-  const glm::dvec3& pa = mesh_.places[a];
-  const glm::dvec3& pb = mesh_.places[b];
+  Quadric sum = places_[a].quadric;
+  sum += places_[b].quadric;
+  const glm::dvec3& pa = point_of(a);
+  const glm::dvec3& pb = point_of(b);
   const glm::dvec3 middle = 0.5 * (pa + pb);
   std::array<glm::dvec3, 4> points = {pa, pb, middle};
   std::size_t count = 3;
@@ -259,7 +265,7 @@ MeshCollapser::Target MeshCollapser::target_of(std::uint32_t a, std::uint32_t b)
     const glm::dvec3 edge = pb - pa;
     if (glm::dot(off, off) <= kFarthest * kFarthest * glm::dot(edge, edge)) count = 4;
   }
-  const bool slides = several_[a] != 0 || several_[b] != 0;
+  const bool slides = places_[a].several || places_[b].several;
   if (slides) collect(a, b);
   Target best;
   best.price = std::numeric_limits<double>::infinity();
@@ -279,11 +285,12 @@ MeshCollapser::Target MeshCollapser::target_of(std::uint32_t a, std::uint32_t b)
 void MeshCollapser::collect(std::uint32_t a, std::uint32_t b) {
   near_.clear();
   for (const std::uint32_t place : {a, b}) {
-    around(place, [&](std::uint32_t f, std::uint32_t, std::uint32_t) {
+    around(place, [&](std::uint32_t corner, std::uint32_t c, std::uint32_t d) {
+      if (place == b && (c == a || d == a)) return;
+      const std::uint32_t f = corner / 3;
       const auto& at = mesh_.faces[f].places;
       NearFace near{f, {}};
       for (std::size_t k = 0; k < 3; ++k) near.at[k] = at[k] == a || at[k] == b;
-      if (place == b && (at[0] == a || at[1] == a || at[2] == a)) return;
       near_.push_back(near);
     });
   }
@@ -329,7 +336,7 @@ double MeshCollapser::slide_at(const glm::dvec3& point) {
         has = has || (near.at[k] && root_of(looks_, face.looks[k]) == root);
       }
       if (!has) continue;
-      const std::array<glm::dvec3, 3> t = corners_of(mesh_, face);
+      const std::array<glm::dvec3, 3> t = corners_of(face);
       square = std::min(square, distance_square(point, t, square));
       area += 0.5 * glm::length(glm::cross(t[1] - t[0], t[2] - t[0]));
     }
@@ -340,10 +347,9 @@ double MeshCollapser::slide_at(const glm::dvec3& point) {
 
 /// Has a place a triangle without another one?
 bool MeshCollapser::has_more(std::uint32_t place, std::uint32_t other) const {
-  for (std::uint32_t corner = first_[place]; corner != kNoIndex; corner = next_[corner]) {
-    if (alive_[corner / 3] == 0) continue;
-    const std::array<std::uint32_t, 3>& at = mesh_.faces[corner / 3].places;
-    if (at[0] != other && at[1] != other && at[2] != other) return true;
+  for (std::uint32_t at = places_[place].first; at != kNoIndex; at = corners_[at].next) {
+    const Corner& corner = corners_[at];
+    if (!corner.is_gone() && corner.a != other && corner.b != other) return true;
   }
   return false;
 }
@@ -354,8 +360,8 @@ float MeshCollapser::loss_of(std::uint32_t a, std::uint32_t b) {
   if (has_more(a, b) || has_more(b, a)) return 0.0f;
   double area = 0;
   double square = 0;
-  around(a, [&](std::uint32_t f, std::uint32_t, std::uint32_t) {
-    const std::array<glm::dvec3, 3> t = corners_of(mesh_, mesh_.faces[f]);
+  around(a, [&](std::uint32_t corner, std::uint32_t, std::uint32_t) {
+    const std::array<glm::dvec3, 3> t = corners_of(mesh_.faces[corner / 3]);
     area += 0.5 * glm::length(glm::cross(t[1] - t[0], t[2] - t[0]));
     for (std::size_t k = 0; k < 3; ++k) {
       const glm::dvec3 side = t[(k + 1) % 3] - t[k];
@@ -367,10 +373,7 @@ float MeshCollapser::loss_of(std::uint32_t a, std::uint32_t b) {
 }
 
 void MeshCollapser::drop(std::uint32_t place) {
-  around(place, [&](std::uint32_t f, std::uint32_t, std::uint32_t) {
-    alive_[f] = 0;
-    --alive_count_;
-  });
+  around(place, [&](std::uint32_t corner, std::uint32_t, std::uint32_t) { remove(corner / 3); });
 }
 
 /// Have two places other common neighbours than those of the triangles between them? Then the
@@ -400,10 +403,10 @@ bool MeshCollapser::folds(std::uint32_t a, std::uint32_t b) {
 bool MeshCollapser::turns(std::uint32_t a, std::uint32_t b, const glm::dvec3& point) {
   bool found = false;
   for (const std::uint32_t place : {a, b}) {
-    const glm::dvec3& from = mesh_.places[place];
+    const glm::dvec3& from = point_of(place);
     around(place, [&](std::uint32_t, std::uint32_t c, std::uint32_t d) {
       if (found || c == a || d == a || c == b || d == b) return;
-      found = turns_too_far(mesh_.places[c], mesh_.places[d], from, point);
+      found = turns_too_far(point_of(c), point_of(d), from, point);
     });
   }
   return found;
@@ -415,8 +418,7 @@ void MeshCollapser::collapse(std::uint32_t to, std::uint32_t from, const glm::dv
   for (const NearFace& near : near_) {
     CollapseFace& face = mesh_.faces[near.face];
     if (near.at[0] + near.at[1] + near.at[2] > 1) {
-      alive_[near.face] = 0;
-      --alive_count_;
+      remove(near.face);
       continue;
     }
     for (std::size_t k = 0; k < 3; ++k) {
@@ -424,18 +426,23 @@ void MeshCollapser::collapse(std::uint32_t to, std::uint32_t from, const glm::dv
       face.places[k] = to;
       face.looks[k] = root_of(looks_, face.looks[k]);
       face.shades[k] = root_of(shades_, face.shades[k]);
+      const std::array<std::uint32_t, 2>& others = kOtherCorners[k];
+      corners_[3 * near.face + others[0]].b = to;
+      corners_[3 * near.face + others[1]].a = to;
     }
   }
-  std::uint32_t* end = &first_[to];
-  while (*end != kNoIndex) end = &next_[*end];
-  *end = std::exchange(first_[from], kNoIndex);
-  mesh_.places[to] = point;
-  quadrics_[to] += quadrics_[from];
-  borders_[to] |= borders_[from];
-  if ((several_[to] | several_[from]) != 0) several_[to] = has_several_looks(to) ? 1 : 0;
+  Place& kept = places_[to];
+  Place& gone = places_[from];
+  std::uint32_t* end = &kept.first;
+  while (*end != kNoIndex) end = &corners_[*end].next;
+  *end = std::exchange(gone.first, kNoIndex);
+  kept.point = point;
+  kept.quadric += gone.quadric;
+  kept.open = kept.open || gone.open;
+  if (kept.several || gone.several) kept.several = has_several_looks(to);
   parents_[from] = to;
-  ++versions_[to];
-  ++versions_[from];
+  ++kept.version;
+  ++gone.version;
   push_around(to);
 }
 
@@ -444,8 +451,9 @@ struct MeshCollapser::Nearest {
   ClosestPoint closest{std::numeric_limits<double>::infinity(), 0, 0};
   const CollapseFace* face = nullptr;
 
-  void consider(const CollapseMesh& mesh, const CollapseFace& other, const glm::dvec3& point) {
-    const ClosestPoint found = closest_point(point, corners_of(mesh, other));
+  void consider(const CollapseFace& other, const std::array<glm::dvec3, 3>& corners,
+                const glm::dvec3& point) {
+    const ClosestPoint found = closest_point(point, corners);
     if (found.square < closest.square) *this = {found, &other};
   }
   [[nodiscard]] std::array<double, 3> weights() const {
@@ -472,7 +480,7 @@ void MeshCollapser::carry(const glm::dvec3& point,
       for (std::size_t k = 0; k < 3; ++k) {
         has = has || (near.at[k] && root_of(joined, (face.*member)[k]) == root);
       }
-      if (has) nearest.consider(mesh_, face, point);
+      if (has) nearest.consider(face, corners_of(face), point);
     }
     callback(root, only ? all : nearest);
   }
@@ -480,7 +488,10 @@ void MeshCollapser::carry(const glm::dvec3& point,
 
 void MeshCollapser::carry_corners(const glm::dvec3& point) {
   Nearest all;
-  for (const NearFace& near : near_) all.consider(mesh_, mesh_.faces[near.face], point);
+  for (const NearFace& near : near_) {
+    const CollapseFace& face = mesh_.faces[near.face];
+    all.consider(face, corners_of(face), point);
+  }
   carry(point, &CollapseFace::looks, looks_, all, [&](std::uint32_t root, const Nearest& nearest) {
     CornerLook sum;
     const std::array<double, 3> weights = nearest.weights();

@@ -123,13 +123,39 @@ class MeshCollapser {
   [[nodiscard]] std::size_t triangles() const { return alive_count_; }
   /// The triangles that are left, in the order in which they came.
   [[nodiscard]] std::vector<CollapseFace> faces() const;
-  [[nodiscard]] const CollapseMesh& mesh() const { return mesh_; }
+  [[nodiscard]] std::size_t places() const { return places_.size(); }
+  /// Where a place is that is a corner of a triangle that is left.
+  [[nodiscard]] const glm::dvec3& point_of(std::uint32_t place) const {
+    return places_[place].point;
+  }
+  [[nodiscard]] const CornerLook& look(std::uint32_t number) const { return mesh_.looks[number]; }
+  [[nodiscard]] const CornerShade& shade(std::uint32_t number) const {
+    return mesh_.shades[number];
+  }
   /// Is a triangle of the mesh left? By its number there.
   [[nodiscard]] bool has(std::uint32_t face) const { return alive_[face] != 0; }
   /// The place that a place has become.
   std::uint32_t place_of(std::uint32_t place);
 
  private:
+  /// What is asked of a place at once, in two lines of the cache: collapses come from anywhere.
+  struct alignas(64) Place {
+    Quadric quadric;
+    glm::dvec3 point{0.0};
+    std::uint32_t first = kNoIndex;  ///< its first corner
+    std::uint32_t version = 0;
+    bool open = false;     ///< on an edge of one triangle
+    bool several = false;  ///< has several looks
+  };
+  /// Of a triangle: the place's next corner, and the two places that follow it, which are equal
+  /// where the triangle is gone.
+  struct Corner {
+    std::uint32_t next = kNoIndex;
+    std::uint32_t a = 0;
+    std::uint32_t b = 0;
+    [[nodiscard]] bool is_gone() const { return a == b; }
+    void leave() { a = b; }
+  };
   /// A collapse of `from` into `to`, as it was when it was priced.
   struct Candidate {
     float price = 0;
@@ -156,6 +182,8 @@ class MeshCollapser {
   template <class Callback>
   void around(std::uint32_t place, const Callback& callback);
   void link_faces();
+  [[nodiscard]] std::array<glm::dvec3, 3> corners_of(const CollapseFace& face) const;
+  void remove(std::uint32_t f);
   void price_faces();
   bool is_open(std::uint32_t place);
   void add_border(std::uint32_t f, std::uint32_t k);
@@ -185,17 +213,13 @@ class MeshCollapser {
     std::array<bool, 3> at{};
   };
 
-  CollapseMesh mesh_;
+  CollapseMesh mesh_;                // its places are in places_
   std::vector<std::uint8_t> alive_;  // of each face
   std::vector<std::uint32_t> left_;  // faces, in order; some of them may be gone
   std::size_t alive_count_ = 0;
-  std::vector<std::uint32_t> first_;   // of each place: its first corner
-  std::vector<std::uint32_t> next_;    // of each corner: the place's next one
-  std::vector<Quadric> quadrics_;      // of each place
-  std::vector<std::uint8_t> borders_;  // of each place: 1 on an edge of one triangle
-  std::vector<std::uint32_t> versions_;
+  std::vector<Place> places_;
+  std::vector<Corner> corners_;         // three a triangle
   std::vector<std::uint32_t> parents_;  // of each place: what it went to, or itself
-  std::vector<std::uint8_t> several_;   // of each place: 1 where it has several looks
   std::vector<std::uint32_t> marks_;
   std::uint32_t mark_ = 0;
   CollapseQueue<Candidate> queue_;

@@ -226,7 +226,6 @@ TriMesh mesh_of(const TriMesh& source, const MeshCollapser& collapser, const glm
   mesh.source_max = source.source_max;
   mesh.materials = source.materials;
   Numbers<2> vertices;
-  const CollapseMesh& all = collapser.mesh();
   for (const CollapseFace& face : collapser.faces()) {
     std::array<std::uint32_t, 3> triangle{};
     for (std::size_t k = 0; k < 3; ++k) {
@@ -234,9 +233,9 @@ TriMesh mesh_of(const TriMesh& source, const MeshCollapser& collapser, const glm
       triangle[k] = number;
       if (!added) continue;
       places.push_back(face.places[k]);
-      mesh.positions.push_back(glm::clamp(all.places[face.places[k]], low, high));
-      const CornerLook& look = all.looks[face.looks[k]];
-      const CornerShade& shade = all.shades[face.shades[k]];
+      mesh.positions.push_back(glm::clamp(collapser.point_of(face.places[k]), low, high));
+      const CornerLook& look = collapser.look(face.looks[k]);
+      const CornerShade& shade = collapser.shade(face.shades[k]);
       if (!source.normals.empty()) mesh.normals.push_back(shade.normal);
       if (!source.uvs.empty()) mesh.uvs.push_back(look.uv);
       if (!source.colours.empty()) {
@@ -379,7 +378,7 @@ class StandInMaker {
         options_(options),
         joined_(join_chunks(mesh, options.positions, options.plan.halvings[0] - kFinerHalvings)),
         collapser_(collapse_mesh(mesh.mesh, joined_)),
-        places_(collapser_.mesh().places.size()),
+        places_(collapser_.places()),
         points_(look_points(joined_, mesh.mesh)),
         lengths_of_uv_(lengths_of_uv(joined_, mesh.mesh)),
         cells_(points_.middles),
