@@ -53,10 +53,6 @@ constexpr float kLeastPrice = static_cast<float>(kDistanceFloor * kDistanceFloor
 /// Halvings of a chunk beyond the coarsest level: the model's triangles are shared out by need, and
 /// a flat chunk may lose more than its share. Swept on scans: flat from 1 to 4.
 constexpr std::uint32_t kFurther = 1;
-/// Chunks of more triangles are looked at in every other one only. Swept on scans: flat from 2,500
-/// to 40,000.
-constexpr std::size_t kFewLooks = 10'000;
-constexpr std::size_t kLookStep = 6;  ///< indices
 /// Of the error of the next coarser level: a level that is off by more is hardly ever drawn, as
 /// that one may be from nearly the same distance on. Bundles of five scans are smaller by 1 to 11 %
 /// without such levels, that of a rough grid by 17 %.
@@ -392,14 +388,17 @@ class MeasuredLevel {
   std::vector<std::uint32_t> of_vertices_;
 };
 
-/// Of each vertex of some triangles of a finer level, a triangle of a level near it.
-std::vector<std::uint32_t> near_vertices(MeasuredLevel& level, std::span<const std::uint16_t> finer,
+/// Of each vertex of the finest level, a triangle of a level near it; kNoIndex: that piece is gone.
+std::vector<std::uint32_t> near_vertices(MeasuredLevel& level,
                                          std::span<const glm::dvec3> positions,
                                          const std::vector<std::uint16_t>& become) {
-  std::vector<std::uint32_t> nearby = level.of_vertices();
-  for (const std::uint16_t v : finer) {
-    if (nearby[v] != kNoIndex || nearby[become[v]] == kNoIndex) continue;
-    nearby[v] = level.surface().walk(positions[v], nearby[become[v]]);
+  const std::vector<std::uint32_t>& of_vertices = level.of_vertices();
+  std::vector<std::uint32_t> nearby = of_vertices;
+  for (std::size_t v = 0; v < nearby.size(); ++v) {
+    const std::uint32_t start = of_vertices[become[v]];
+    if (nearby[v] == kNoIndex && start != kNoIndex) {
+      nearby[v] = level.surface().walk(positions[v], start);
+    }
   }
   return nearby;
 }
@@ -431,15 +430,9 @@ CollapseBound settled_by_collapses(MeasuredLevel& level, std::span<const std::ui
 
 /// Measures what collapses leave open of a level's distance from the finest: one by one.
 double distance_of_open(MeasuredLevel& level, MeasuredLevel& finest,
-                        std::span<const glm::dvec3> positions,
-                        const std::vector<std::uint16_t>& become, const CollapseBound& bound,
+                        const std::vector<std::uint16_t>& become,
+                        const std::vector<std::uint32_t>& nearby, const CollapseBound& bound,
                         double least) {
-  std::vector<std::uint16_t> corners;
-  for (const std::uint32_t t : bound.open) {
-    const auto first = finest.indices.begin() + 3 * static_cast<std::ptrdiff_t>(t);
-    corners.insert(corners.end(), first, first + 3);
-  }
-  const std::vector<std::uint32_t> nearby = near_vertices(level, corners, positions, become);
   const double up =
       surface_distance(finest.surface(), level.surface(), nearby, least, 0, bound.settled);
   // Each triangle is what one of the finest has become, in the same order.
@@ -457,10 +450,11 @@ double distance_of_open(MeasuredLevel& level, MeasuredLevel& finest,
 }
 
 /// Measures a level: by the collapses from the finest where they tell enough, or its distance from
-/// a finer one, and that one's from the finest. hidden: a distance that need not be told apart.
+/// a finer one, and that one's from the finest. nearby: see near_vertices(). hidden: a distance
+/// that need not be told apart.
 void measure(MeasuredLevel& level, std::vector<MeasuredLevel>& finer,
              std::span<const glm::dvec3> positions, const std::vector<std::uint16_t>& become,
-             double hidden) {
+             const std::vector<std::uint32_t>& nearby, double hidden) {
   const double least = finer.back().error;
   const double enough = std::max(least, hidden);
   MeasuredLevel& finest = finer.front();
@@ -470,12 +464,11 @@ void measure(MeasuredLevel& level, std::vector<MeasuredLevel>& finer,
     level.error = std::max(least, bound.moved);
   } else if (bound.open.size() * kMostOpen < finest.triangles()) {
     level.error =
-        distance_of_open(level, finest, positions, become, bound, std::max(least, bound.moved));
+        distance_of_open(level, finest, become, nearby, bound, std::max(least, bound.moved));
   } else {
     const auto exact = [&](MeasuredLevel& other) { return other.error <= kNegligible * least; };
     MeasuredLevel& from = *std::find_if(finer.rbegin(), finer.rend(), exact);
-    const double distance = level_distance(from.surface(), level.surface(),
-                                           near_vertices(level, from.indices, positions, become),
+    const double distance = level_distance(from.surface(), level.surface(), nearby,
                                            from.of_vertices(), enough - from.error);
     level.error = from.error + distance;
   }
@@ -514,41 +507,36 @@ double greatest_uv_shift(LevelSurface& surface, const ChunkVertices& vertices,
   return greatest;
 }
 
-/// Compares the looks of levels of one chunk with that of the finest: at the middles of its
-/// triangles.
+/// Compares the looks of levels of one chunk with that of the finest: at its vertices, each of
+/// which stands for a third of the triangles around it. Where a vertex has several normals, at the
+/// middles of its triangles.
 class ChunkLooker {
  public:
   ChunkLooker(const TriMesh& mesh, const Chunk& chunk, const MergedVertices& merged,
               std::span<const glm::dvec3> positions, double length_of_uv)
       : mesh_(mesh),
         chunk_(chunk),
-        merged_(merged),
+        flat_(!merged.first.empty()),
         length_of_uv_(length_of_uv),
-        step_(chunk.indices.size() / 3 > kFewLooks ? kLookStep : 3),
-        points_(middles(positions)),
+        points_(flat_ ? middles(merged, positions) : vertices(positions)),
         cells_(points_) {}
 
   /// As ChunkLevel::shading. level: its triangles, with the vertices that carry their normals.
-  /// become: what each vertex of the finest has become.
+  /// become: what each vertex of the finest has become. nearby: see near_vertices().
   double shading(MeasuredLevel& measured, const std::vector<std::uint16_t>& level,
-                 const std::vector<std::uint16_t>& become) {
+                 const std::vector<std::uint16_t>& become,
+                 const std::vector<std::uint32_t>& nearby) {
     const LevelSurface& surface = measured.surface();
-    const std::vector<std::uint32_t>& of_vertices = measured.of_vertices();
-    const std::span<const std::uint16_t> finest = merged_.indices_of(chunk_);
     std::vector<LookDifference> differences(points_.size());
-    // Triangles that stay come in the order of the finest level.
-    std::uint32_t stayed = 0;
-    for (std::size_t at = 0; at < finest.size(); at += 3) {
-      const std::uint16_t a = become[finest[at]];
-      const std::uint16_t b = become[finest[at + 1]];
-      const std::uint16_t c = become[finest[at + 2]];
-      const bool stays = a != b && b != c && c != a;
-      std::uint32_t start = stays ? stayed++ : of_vertices[a];
-      if (at % step_ != 0 || start == kNoIndex) continue;
-      const std::size_t i = at / step_;
-      // By way of a corner, a walk goes astray less often.
-      if (!stays) start = surface.walk(surface.position(finest[at]), start);
-      const std::uint32_t t = surface.walk(points_[i], start);
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      std::uint32_t t = nearby[of_[i]];
+      if (t == kNoIndex) continue;
+      if (!flat_ && become[of_[i]] == of_[i]) {
+        differences[i].area = static_cast<float>(areas_[i]);
+        continue;
+      }
+      // By way of the vertex, a walk to a middle goes astray less often.
+      if (flat_) t = surface.walk(points_[i], t);
       const ClosestPoint closest = closest_point(points_[i], surface.triangle(t));
       const Look there =
           look_at(mesh_, vertices_of(&level[3 * std::size_t{t}]), closest.b, closest.c);
@@ -558,17 +546,33 @@ class ChunkLooker {
   }
 
  private:
-  std::vector<glm::dvec3> middles(std::span<const glm::dvec3> positions) {
+  std::vector<glm::dvec3> vertices(std::span<const glm::dvec3> positions) {
+    areas_.assign(positions.size(), 0.0);
+    for (std::size_t i = 0; i < chunk_.indices.size(); i += 3) {
+      const std::uint16_t* t = &chunk_.indices[i];
+      const double area = twice_area(positions, t) / 3;
+      for (std::size_t k = 0; k < 3; ++k) areas_[t[k]] += area;
+    }
+    of_.resize(positions.size());
+    std::iota(of_.begin(), of_.end(), std::uint16_t{0});
+    for (const std::uint32_t v : chunk_.vertices) looks_.push_back(look_at(mesh_, {v, v, v}, 0, 0));
+    return {positions.begin(), positions.end()};
+  }
+  std::vector<glm::dvec3> middles(const MergedVertices& merged,
+                                  std::span<const glm::dvec3> positions) {
     std::vector<glm::dvec3> points;
-    for (std::size_t i = 0; i < chunk_.indices.size(); i += step_) {
-      const glm::dvec3& a = positions[chunk_.indices[i]];
-      const glm::dvec3& b = positions[chunk_.indices[i + 1]];
-      const glm::dvec3& c = positions[chunk_.indices[i + 2]];
-      points.push_back((a + b + c) / 3.0);
-      areas_.push_back(glm::length(glm::cross(b - a, c - a)));
-      looks_.push_back(look_at(mesh_, vertices_of(&chunk_.indices[i]), 1.0 / 3, 1.0 / 3));
+    for (std::size_t i = 0; i < chunk_.indices.size(); i += 3) {
+      const std::uint16_t* t = &chunk_.indices[i];
+      points.push_back((positions[t[0]] + positions[t[1]] + positions[t[2]]) / 3.0);
+      of_.push_back(merged.first[t[0]]);
+      areas_.push_back(twice_area(positions, t));
+      looks_.push_back(look_at(mesh_, vertices_of(t), 1.0 / 3, 1.0 / 3));
     }
     return points;
+  }
+  static double twice_area(std::span<const glm::dvec3> positions, const std::uint16_t* corners) {
+    const glm::dvec3& origin = positions[corners[0]];
+    return glm::length(glm::cross(positions[corners[1]] - origin, positions[corners[2]] - origin));
   }
   [[nodiscard]] std::array<std::uint32_t, 3> vertices_of(const std::uint16_t* corners) const {
     return {chunk_.vertices[corners[0]], chunk_.vertices[corners[1]], chunk_.vertices[corners[2]]};
@@ -576,9 +580,9 @@ class ChunkLooker {
 
   const TriMesh& mesh_;
   const Chunk& chunk_;
-  const MergedVertices& merged_;
+  bool flat_;
   double length_of_uv_;
-  std::size_t step_;  ///< indices from one point to the next
+  std::vector<std::uint16_t> of_;  ///< of each point: a vertex there, or of its triangle
   std::vector<double> areas_;
   std::vector<Look> looks_;  ///< of the finest level
   std::vector<glm::dvec3> points_;
@@ -609,15 +613,15 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkG
     MeasuredLevel coarser(positions, collapsed_triangles(finest, become));
     ChunkLevel& level = chunk.coarser.emplace_back();
     level.halvings = cut.halvings;
+    const std::vector<std::uint32_t> nearby = near_vertices(coarser, positions, become);
     if (!texels.empty()) {
-      level.uv_shift =
-          greatest_uv_shift(coarser.surface(), {positions, texels}, become,
-                            near_vertices(coarser, finest, positions, become), limits.max_uv_shift);
+      level.uv_shift = greatest_uv_shift(coarser.surface(), {positions, texels}, become, nearby,
+                                         limits.max_uv_shift);
     }
     level.indices = coarser.indices;
     split_normals(mesh, chunk, merged, positions, level.indices);
-    level.shading = looker.shading(coarser, level.indices, become);
-    measure(coarser, levels, positions, become, hidden * level.shading);
+    level.shading = looker.shading(coarser, level.indices, become, nearby);
+    measure(coarser, levels, positions, become, nearby, hidden * level.shading);
     level.error = coarser.error;
     levels.push_back(std::move(coarser));
   }

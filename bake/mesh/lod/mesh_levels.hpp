@@ -10,8 +10,8 @@
 
 namespace modar {
 
-/// See LevelOptions. Measuring so many takes 0.15 CPU-s.
-inline constexpr std::size_t kMeasuredTriangles = 50'000;
+/// See LevelOptions. Measuring a scan of 37,626 triangles takes 0.18 of 0.36 CPU-s (`modar bake`).
+inline constexpr std::size_t kMeasuredTriangles = 20'000;
 
 struct LevelOptions {
   std::uint32_t levels = 4;  ///< greatest number a chunk, the finest counted; 1 to kMaxLevels
