@@ -20,6 +20,9 @@ constexpr std::array<float, 3> kClear = {1.0f, 0.0f, 1.0f};  ///< no model is al
 /// Of the size at which a level is first drawn: within it, rounding does not choose a finer one.
 constexpr double kBehind = 1 - 1e-4;
 
+/// Of a pixel, along a side.
+constexpr int kLeastSamples = 4;
+
 /// Chunks and levels that are first drawn together.
 struct Switch {
   std::vector<std::pair<std::uint32_t, float>> chunks;  ///< each with the error of its level
@@ -148,13 +151,15 @@ class LevelLooker {
       const double diameter =
           2 * focal * radius_ / std::sqrt(kViewDistance * kViewDistance - radius_ * radius_);
       const int side = static_cast<int>(std::min<double>(options_.side, std::ceil(diameter) + 2));
-      MODAR_TRY(draw(direction, focal, side, options_.lod_pixels, coarse_));
+      const int block = std::max(kLeastSamples, options_.samples / side);
+      MODAR_TRY(draw(direction, block * focal, block * side,
+                     static_cast<float>(block) * options_.lod_pixels, coarse_));
       look.triangles += renderer_.stats().triangles;
-      MODAR_TRY(draw(direction, focal, side, 0.0f, fine_));
+      MODAR_TRY(draw(direction, block * focal, block * side, 0.0f, fine_));
       look.finest_triangles += renderer_.stats().triangles;
       look.side_px += diameter / kViews;
-      differences.add(coarse_, fine_, static_cast<std::size_t>(side * options_.oversampling),
-                      static_cast<std::size_t>(options_.oversampling));
+      differences.add(coarse_, fine_, static_cast<std::size_t>(block * side),
+                      static_cast<std::size_t>(block));
     }
     look.triangles /= kViews;
     look.finest_triangles /= kViews;
@@ -165,19 +170,18 @@ class LevelLooker {
  private:
   Result<void> draw(const glm::dvec3& direction, double focal, int side, float pixels,
                     std::vector<std::uint8_t>& picture) {
-    const int larger = side * options_.oversampling;
-    Camera camera = default_camera(larger, larger);
-    camera.fx = camera.fy = focal * options_.oversampling;
+    Camera camera = default_camera(side, side);
+    camera.fx = camera.fy = focal;
     RenderOptions render;
     render.clear_colour = {kClear[0], kClear[1], kClear[2], 1.0f};
-    render.lod_pixels = pixels * static_cast<float>(options_.oversampling);
+    render.lod_pixels = pixels;
     renderer_.set_options(render);
-    MODAR_TRY(renderer_.resize(larger, larger));
+    MODAR_TRY(renderer_.resize(side, side));
     const DrawItem item{model_, glm::mat4(view_from(direction))};
     const DepthRange range = depth_range(bundle_, {&item, 1});
     renderer_.render(RgbImage{}, gl_projection(camera, range.near_plane, range.far_plane),
                      {&item, 1});
-    picture.resize(4 * static_cast<std::size_t>(larger) * static_cast<std::size_t>(larger));
+    picture.resize(4 * static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
     renderer_.read_pixels(picture);
     return {};
   }

@@ -29,15 +29,16 @@ struct LevelLook {
   std::uint64_t triangles = 0;  ///< drawn, mean of the views
   std::uint64_t finest_triangles = 0;
   /// 99th percentile of the greatest difference of a channel, of 255, over pixels that show nothing
-  /// but the model. Both pictures are drawn larger and averaged, so that what twinkles under one
-  /// sample a pixel is not counted as a difference.
+  /// but the model. Both pictures are drawn larger and averaged, so that what twinkles under few
+  /// samples a pixel is not counted as a difference: of a scan of 0.85 million triangles, 11 pixels
+  /// wide, 5.5 of 255 with 16 samples a pixel, 1.1 with 2,000 and with 8,000.
   double difference = 0;
 };
 
 struct LevelLookOptions {
   int side = 512;           ///< of a view, pixels, at most
   float lod_pixels = 1.0f;  ///< as RenderOptions has it
-  int oversampling = 4;     ///< samples of a pixel along a side
+  int samples = 1024;       ///< of a picture along a side, about; 4 of a pixel at least
 };
 
 /// Draws a model at each of its levels, and at the finest, from 12 sides. Errors: kUnsupported
