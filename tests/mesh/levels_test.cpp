@@ -900,7 +900,10 @@ TEST(Levels, PixelsAreAsLargeAsWhatDiffersInThem) {
   };
   EXPECT_EQ(pixel([&](int, int) { return normal(0.01f); }), 0.0);
   // It shows as long as the whole is a pixel.
-  EXPECT_GE(pixel([&](int, int) { return normal(0.03f); }), 2.0);
+  const double whole = pixel([&](int, int) { return normal(0.03f); });
+  EXPECT_GE(whole, 2.0);
+  // In larger pixels, by the part of their area: four times as much does in twice the side.
+  EXPECT_NEAR(pixel([&](int, int) { return normal(0.12f); }), 2 * whole, 1e-3);
   // From point to point, and in bands of eight, one way and the other.
   const double fine = pixel([&](int x, int) { return normal(x % 2 == 0 ? 0.1f : -0.1f); });
   EXPECT_GT(fine, kStep / 2);

@@ -94,13 +94,18 @@ double PixelCells::share_above(unsigned bits) const {
   for (std::size_t i = 0; i < places_.size(); ++i) {
     if (i > 0 && places_[i].cell >> shift != places_[i - 1].cell >> shift) close();
     const LookDifference& d = weighed_[i];
-    cell.normal += d.normal;
-    cell.colour += d.colour;
-    cell.slide += d.slide;
-    cell.area += d.area;
+    cell += d;
   }
   close();
   return all > 0 ? above / all : 0.0;
+}
+
+/// Of 255, where the whole box is a pixel. A pixel that is larger shows as much less as the box is
+/// a smaller part of its area.
+double PixelCells::shown_at_once() const {
+  LookDifference all;
+  for (const LookDifference& d : weighed_) all += d;
+  return static_cast<double>(shown(all, static_cast<float>(side_)));
 }
 
 double PixelCells::smallest_pixel(std::span<const LookDifference> differences) {
@@ -127,7 +132,7 @@ double PixelCells::smallest_pixel(std::span<const LookDifference> differences) {
     share = share_above(bits_ - 1);
   }
   const double side = std::ldexp(side_, -static_cast<int>(bits_));
-  if (share > kShare) return 2 * side;
+  if (share > kShare) return 2 * side * std::sqrt(shown_at_once() / double{kSame});
   // Between the two sides, as a power law.
   const double most = std::log(finer / std::max(share, kShare / 16));
   return side * std::exp2(-1 + std::log(finer / kShare) / most);

@@ -38,6 +38,12 @@ struct LookDifference {
         colour(there.colour - here.colour),
         slide(length_of_uv * (there.uv - here.uv)),
         area(static_cast<float>(of_area)) {}
+  void operator+=(const LookDifference& other) {
+    normal += other.normal;
+    colour += other.colour;
+    slide += other.slide;
+    area += other.area;
+  }
 };
 
 /// Points of a surface in cells, each of which stands for a pixel: halves of a box, again and
@@ -48,11 +54,13 @@ class PixelCells {
 
   /// Side of the smallest pixel, in the points' unit, over which differences average out: but for 1
   /// % of the area, all pixels of a picture differ by less than 2 of 255. 0: any pixel will do.
+  /// Larger than the points' box where even that differs by more, the more the larger.
   /// differences: one a point.
   [[nodiscard]] double smallest_pixel(std::span<const LookDifference> differences);
 
  private:
   [[nodiscard]] double share_above(unsigned bits) const;
+  [[nodiscard]] double shown_at_once() const;
 
   struct Place {
     std::uint32_t cell = 0;  ///< three bits a halving, the coarsest first
