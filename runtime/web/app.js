@@ -364,5 +364,7 @@ function keep(whole) {
 adopt(document, BASE);
 listen();
 const prepared = prepare();
-prepared.catch(tellUnprepared).then(() => loading).then(() => keep()).then(() => viewer.whole).then(() => brought).catch(() => {})
-  .then(() => keep(true));
+// Not while the first picture is looked for: a service worker that brings the page delayed its finding by 3 s.
+const found = new Promise((resolve) => { viewer.addEventListener('found', resolve, { once: true }); });
+prepared.catch(tellUnprepared).then(() => loading).then(() => viewer.shown).then(() => Promise.race([found, viewer.whole])).then(() => keep())
+  .then(() => viewer.whole).then(() => brought).catch(() => {}).then(() => keep(true));

@@ -58,6 +58,8 @@ export class View extends EventTarget {
   drawFrom(pattern: number, view: Float32Array, focal: number): void;
   /** The same of several patterns, each with a view of its own. */
   drawEach(views: [pattern: number, view: Float32Array][], focal: number): void;
+  /** Resolved when something of every model of a packed bundle is there, and drawn. */
+  readonly shown: Promise<void>;
   /** Resolved when all of the bundle is there, and drawn: a packed one comes on after create(), and videos and actions that need it wait. */
   readonly whole: Promise<void>;
   /** Those of the bundle, then those of stand(). */

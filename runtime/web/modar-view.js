@@ -49,7 +49,8 @@ export class View extends EventTarget {
   #lost = false;
   /** Until there is something to draw. */
   #empty = true;
-  /** Of a packed bundle: all of it is there, and drawn. */
+  /** Of a packed bundle: something of every model is there, and drawn; all of it is. */
+  shown = Promise.resolve();
   whole = Promise.resolve();
   #complete = false;
   /** What showCoarse() shows is there. */
@@ -106,20 +107,23 @@ export class View extends EventTarget {
       view.#lose();
     });
     models.addEventListener('webglcontextrestored', () => view.#restore(webgl1));
-    view.whole = view.#refine(arrival);
+    view.shown = view.#bringCoarse(arrival);
+    view.whole = view.shown.then(() => view.#refine(arrival));
     view.whole.catch(() => {});  // told to those who wait for it
     if (arrival.inOrder) await view.whole;
     return view;
   }
 
-  /** First the coarsest of everything, then all. */
+  /** Of a packed bundle the coarsest of everything. */
+  async #bringCoarse(arrival) {
+    if (arrival.inOrder) return;
+    await arrival.bring(STAGE.show, (offset, bytes) => this.#engine.put(offset, bytes));
+    this.#showCoarse();
+    performance.mark('modar: coarse');
+    this.#tellRefined();
+  }
+
   async #refine(arrival) {
-    if (!arrival.inOrder) {
-      await arrival.bring(STAGE.show, (offset, bytes) => this.#engine.put(offset, bytes));
-      this.#showCoarse();
-      performance.mark('modar: coarse');
-      this.#tellRefined();
-    }
     if (arrival.size <= this.#maxBytes || this.#maxBytes === 0 || !await this.#bringWanted(arrival)) await this.#bringRest(arrival);
   }
 

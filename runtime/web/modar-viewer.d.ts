@@ -58,6 +58,8 @@ export class ModarViewer extends HTMLElement {
   set words(words: Record<string, unknown>);
   /** start: the cover. looking: the camera, without models. seen: models. around: the turntable. error: the visitor is told why. */
   readonly state: 'start' | 'looking' | 'seen' | 'around' | 'error';
+  /** Resolved when something of every model of a packed bundle is there, and drawn. */
+  readonly shown: Promise<void> | undefined;
   /** Resolved when all of the bundle that is loaded is there, and drawn. */
   readonly whole: Promise<void>;
   /** The bundle that is loaded. */

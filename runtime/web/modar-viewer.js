@@ -135,6 +135,11 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     return this.#modar;
   }
 
+  /** Of a packed bundle: resolved when something of every model is there, and drawn. */
+  get shown() {
+    return this.#view?.shown;
+  }
+
   /** Of a packed bundle: resolved when all of it is there, and drawn. */
   get whole() {
     return this.#view?.whole ?? Promise.resolve();

@@ -1032,6 +1032,7 @@ class Page(ProgramTest):
         self.addCleanup(server.http.over.set)
         kept = f"caches.open('modar {server.url} brought').then((cache) => cache.keys()).then(({{ length }}) => length)"
         self.browser.open(server.url)
+        self.start()
         self.browser.wait(f"{kept}.then((count) => count === {(first + len(packed)) // 2 // part})", "parts that are kept")
         self.browser.wait("navigator.serviceWorker.ready.then(() => true)", "the service worker")
         # Without a network what came is shown.
@@ -1046,7 +1047,7 @@ class Page(ProgramTest):
         server.http.starts, server.http.most, server.http.gone = [], None, False
         self.browser.open(server.url + "?again")
         self.start()
-        self.browser.wait(f"caches.match('{address}').then(Boolean)", "the bundle is kept")
+        self.browser.wait(f"caches.has('modar {server.url} brought').then((there) => !there && caches.match('{address}')).then(Boolean)", "the bundle is kept")
         self.assertEqual(server.http.starts[0], (first + len(packed)) // 2 // part * part)
         self.assertEqual(server.http.starts, sorted(set(server.http.starts)), "asked for what was missing, once")
         hashed = self.browser.run(f"""caches.match('{address}').then((kept) => kept.arrayBuffer())
