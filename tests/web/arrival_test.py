@@ -13,7 +13,7 @@ import unittest
 import urllib.parse
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
-from browser import CANVAS, Browser, Quiet  # noqa: E402
+from browser import CANVAS, KEPT, Browser, Quiet  # noqa: E402
 from programs import COVER, POTTERY, QUICK, ProgramTest  # noqa: E402
 
 HEADER, PIECE = 64, 64
@@ -220,8 +220,7 @@ class Arrival(ProgramTest):
         self.browser.open(f"http://localhost:{self.http.server_port}/{kind}/")
         engine = "performance.getEntriesByType('resource').find(({ name }) => name.endsWith('/engine-simd.wasm'))"
         self.browser.wait(f"{engine}?.initiatorType === 'link'", "what index.html asks for before any script does", 30)
-        self.browser.wait("""caches.keys().then(async (names) => names.filter((name) => name.includes(location.pathname)).length === 1 &&
-          Boolean(await caches.match('bundles/demo.packed', { ignoreSearch: true })))""", "the bundle is kept")
+        self.browser.wait(KEPT, "the bundle is kept")
         kept = self.browser.run("""(async () => {
           const names = (await caches.keys()).filter((name) => name.includes(location.pathname));
           const bundle = await (await caches.open(names[0])).match('bundles/demo.packed', { ignoreSearch: true });

@@ -17,7 +17,7 @@ import unittest
 import urllib.parse
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
-from browser import Browser, Counted, Server, axe_core  # noqa: E402
+from browser import KEPT, Browser, Counted, Server, axe_core  # noqa: E402
 from programs import (COVER, COVERED, POTTERY, QUICK, READINGS, ROOT, TURNED, TURNS, ProgramTest, covered_clip,  # noqa: E402
                       demo_clip, picture, write_turns)
 
@@ -997,7 +997,7 @@ class Page(ProgramTest):
     def test_without_the_server_the_second_visit_works(self):
         self.browser.resize(640, 480)
         self.browser.open(self.server.url)
-        self.browser.wait("caches.match('bundles/demo.packed', { ignoreSearch: true }).then(Boolean)", "what is kept")
+        self.browser.wait(KEPT, "what is kept")
         type(self).server.close()
         try:
             self.browser.open(self.server.url + "?again")
@@ -1010,7 +1010,7 @@ class Page(ProgramTest):
         server = Server(self.site)  # another origin: nothing of it is stored yet
         self.addCleanup(server.close)
         self.browser.open(server.url)
-        self.browser.wait("caches.match('bundles/demo.packed', { ignoreSearch: true }).then(Boolean)", "what is kept")
+        self.browser.wait(KEPT, "what is kept")
         brought = [path for path, _ in server.http.answered if path.startswith("/bundles/")]
         self.assertEqual(len(brought), 1, server.http.answered)
         kept = "caches.keys().then(async (names) => (await caches.match('bundles/demo.packed', { ignoreSearch: true }))?.ok)"
@@ -1047,7 +1047,7 @@ class Page(ProgramTest):
         server.http.starts, server.http.most, server.http.gone = [], None, False
         self.browser.open(server.url + "?again")
         self.start()
-        self.browser.wait(f"caches.has('modar {server.url} brought').then((there) => !there && caches.match('{address}')).then(Boolean)", "the bundle is kept")
+        self.browser.wait(KEPT, "the bundle is kept")
         self.assertEqual(server.http.starts[0], (first + len(packed)) // 2 // part * part)
         self.assertEqual(server.http.starts, sorted(set(server.http.starts)), "asked for what was missing, once")
         hashed = self.browser.run(f"""caches.match('{address}').then((kept) => kept.arrayBuffer())
