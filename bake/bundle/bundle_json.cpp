@@ -374,13 +374,21 @@ std::string length_words(double source_units, const ModelRecord& model) {
   return text;
 }
 
-std::string level_words(const LevelFigures& levels, const ModelRecord& model) {
-  char text[96];
-  std::snprintf(text, sizeof text, ", texture shifted by at most %.1f texels",
-                levels.uv_shift_max_texels);
-  return std::to_string(model.level_count) + " levels of detail, the coarsest off by at most " +
-         length_words(levels.position_error_max, model) +
-         (levels.uv_shift_max_texels > 0 ? text : "");
+std::string level_words(const BundleView& bundle, std::uint32_t index) {
+  const Json list = level_list(bundle, index);
+  const auto figures = stated_levels(bundle, index);
+  if (list.size() < 2 || !figures) return "";
+  const Json last = list.at(list.size() - 1).value_or(Json());
+  char text[128];
+  std::snprintf(text, sizeof text, "%zu levels of detail, down to %.0f triangles", list.size(),
+                last.find("triangles").value_or(0).number().value_or(0));
+  std::string words = text;
+  if (figures->uv_shift_max_texels > 0) {
+    std::snprintf(text, sizeof text, ", texture shifted by at most %.1f texels",
+                  figures->uv_shift_max_texels);
+    words += text;
+  }
+  return words;
 }
 
 std::string scene_words(const BundleView& bundle, std::uint32_t index) {

@@ -48,9 +48,10 @@ struct StatedPlacement {
 };
 std::optional<StatedPlacement> stated_placement(const BundleView& bundle, std::uint32_t scene);
 
-/// "3 components, 1 boundary loop, ...", "levels of detail: off by at most ...": for people.
+/// "3 components, 1 boundary loop, ...": for people.
 std::string topology_words(const MeshTopology& topology);
-std::string level_words(const LevelFigures& levels, const ModelRecord& model);
+/// "6 levels of detail, down to 1328 triangles"; empty where a model has one, or states none.
+std::string level_words(const BundleView& bundle, std::uint32_t model);
 /// "0.42 mm (0.01 % of its diagonal)".
 std::string length_words(double source_units, const ModelRecord& model);
 /// "Y up (the glTF standard), 120 mm high".

@@ -103,8 +103,8 @@ void print_summary(const BundleView& bundle, const Report& report, const std::st
     if (const auto topology = stated_topology(bundle, m)) {
       std::fprintf(stderr, "        %s\n", topology_words(*topology).c_str());
     }
-    if (const auto levels = stated_levels(bundle, m)) {
-      std::fprintf(stderr, "        %s\n", level_words(*levels, model).c_str());
+    if (const std::string levels = level_words(bundle, m); !levels.empty()) {
+      std::fprintf(stderr, "        %s\n", levels.c_str());
     }
   }
   for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {

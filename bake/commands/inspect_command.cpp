@@ -35,8 +35,8 @@ void print_models(const BundleView& bundle) {
     if (const auto topology = stated_topology(bundle, m)) {
       std::printf("  %s\n", topology_words(*topology).c_str());
     }
-    if (const auto levels = stated_levels(bundle, m)) {
-      std::printf("  %s\n", level_words(*levels, model).c_str());
+    if (const std::string levels = level_words(bundle, m); !levels.empty()) {
+      std::printf("  %s\n", levels.c_str());
     }
   }
 }

@@ -284,7 +284,6 @@ class Page {
         row("Triangles", grouped(model.triangle_count)) +
         row("Vertices", grouped(model.vertex_count)) +
         row("Chunks", std::to_string(model.chunk_count)) +
-        row("Levels of detail", std::to_string(model.level_count)) +
         row("Diagonal", print("%.6g", model.diagonal)) + row("Greatest position error", error) +
         row("of the diagonal", print("%.4f %%", 100 * model.position_error_max / model.diagonal)) +
         row("Greatest normal error",
@@ -293,8 +292,8 @@ class Page {
       rows += row("Greatest texture error",
                   print("%.3g texels", static_cast<double>(model.uv_error_max_texels)));
     }
-    if (const auto levels = stated_levels(bundle_, index)) {
-      rows += row("Levels off by at most", print("%.3g", levels->position_error_max));
+    if (const std::string levels = level_words(bundle_, index); !levels.empty()) {
+      rows += row("Detail", levels);
     }
     if (const auto topology = stated_topology(bundle_, index)) {
       rows += row("Shape", topology_words(*topology));

@@ -189,6 +189,8 @@ class Bake(ProgramTest):
         self.assertEqual(triangles, sorted(triangles, reverse=True))
         self.assertEqual((triangles[0], listed[0]["chunks"], listed[0]["error"]), (more["triangles"], more["chunks"], 0))
         self.assertGreaterEqual(listed[-1]["error"], more["levels"]["position_error_max"] * (1 - 1e-6))
+        words = f"{len(triangles)} levels of detail, down to {triangles[-1]} triangles"
+        self.assertIn(words, self.modar("inspect", self.folder / "levels.modar").stdout)
         self.assertLess(plain["bytes"], two["bytes"])
         self.assertLess(two["bytes"], more["bytes"])
         self.assertEqual(plain["bytes_per_triangle"], more["bytes_per_triangle"])
