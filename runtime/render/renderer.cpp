@@ -30,7 +30,7 @@ namespace {
 /// count shading, which shows long before the form does: 1024 times as much is still that. Set by
 /// hand.
 constexpr int kCoarser = 5;
-/// Halvings of such a step, in search of what fits: 4 leave 9 % of error.
+/// Halvings of such a step, in search of what fits, or is wanted next: 4 leave 9 % of error.
 constexpr int kFiner = 4;
 /// Triangles of a frame, a draw call counted as some (see DrawList::cost()). Trades detail near the
 /// eye for the frame rate; the largest scans of one object, of 0.9 million, are still drawn whole.
@@ -269,13 +269,25 @@ struct Renderer::State {
       stats.lod_error = list.greatest_error(bundle);
       return;
     }
-    for (int i = kCoarser; i >= 0; --i) {
-      const float coarse = std::ldexp(pixels, 2 * i);
-      list.build(bundle, painter.setups(), projection, height, items, coarse);
+    const auto lacks = [&](float some) {
+      list.build(bundle, painter.setups(), projection, height, items, some);
       list.sort_by_distance();
       list_levels();
-      if (!geometry.there(levels)) break;
+      return !geometry.there(levels);
+    };
+    float coarse = 0.0f;
+    float fine = pixels;
+    for (int i = kCoarser; i >= 0; --i) {
+      fine = std::ldexp(pixels, 2 * i);
+      if (lacks(fine)) break;
+      coarse = fine;
     }
+    // The coarsest of that step: stand-ins of one model often lie in one.
+    for (int i = 0; coarse > 0.0f && i < kFiner; ++i) {
+      const float middle = std::sqrt(coarse * fine);
+      (lacks(middle) ? fine : coarse) = middle;
+    }
+    lacks(fine);
     geometry.want(levels);
     list.build_of(geometry, bundle, painter.setups(), projection, height, items, pixels);
     stats.lod_error = list.greatest_error(bundle);

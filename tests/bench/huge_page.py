@@ -1,22 +1,25 @@
 #!/usr/bin/env python3
 """A flight over a huge scan in a page that may have little of it on the GPU, in Chromium on a slow line.
 
-    huge_page.py BUNDLE [--max-bytes 64000000] [--line 10e6] [--latency 100] [--seconds 60] [--nearest 0.02] [--page FOLDER] [--keep FOLDER]
+    huge_page.py BUNDLE [--max-bytes 64000000] [--line 10e6] [--latency 100] [--seconds 60] [--hold 20] [--nearest 0.02] [--page FOLDER] [--keep FOLDER]
 
-Makes the page of `modar web`, serves it by ranges, and flies: from far down to the surface, along it, and up again. Prints JSON:
-frames and the longest one (milliseconds, with the drawing, which is SwiftShader's on a CPU), the longest task of the page's own, bytes that
-came, the greatest number of bytes on the GPU, resident memory of all of the browser's processes beside a blank page's, and in pixels on the
-screen the error of what was drawn: at the end of each third of the flight, and by how much it fell at once (pop), the worst time; the
-triangles of those three pictures.
-Errors are those of the bundle's levels, which count shading too: the form differs by less.
+Makes the page of `modar web`, serves it by ranges, and flies: from far down to the surface, along it, and up again; after each third it
+holds still. Prints JSON: frames and the longest one (milliseconds, with the drawing, which is SwiftShader's on a CPU), the longest task of
+the page's own, bytes that came, the greatest number of bytes on the GPU, resident memory of all of the browser's processes beside a blank
+page's, at the end of each hold the triangles and the error of what was drawn (pixels; it counts shading, the form differs by less), and
+`pops`: each time that the picture changed while the eye held still, how far what is seen moved, pixels (median, 95 and 99 % of squares of
+32 pixels, by phase correlation). Needs python3-opencv for the pops.
 
 `modar-model-probe make SCAN TRIANGLES OUT.obj` makes a huge scan out of one; bake it with default options. Needs modar on the path,
 chromium, and the page's engine (preset `web`).
 """
 import argparse
+import base64
 import functools
 import http.server
+import itertools
 import json
+import math
 import pathlib
 import re
 import shutil
@@ -30,10 +33,11 @@ from browser import CANVAS, Browser, Quiet  # noqa: E402
 from first_visit import make_site  # noqa: E402
 from page_memory import resident_by_process, settle  # noqa: E402
 
+SQUARE = 32  # pixels, of which the way is measured
 FLY = """(async () => {
   const [{ load }, { View }] = await Promise.all([import('/modar.js'), import('/modar-view.js')]);
   """ + CANVAS + """
-  const flown = globalThis.flown = { frames: 0, longest: 0, task: 0, gpu: 0, pop: 0, errors: [], triangles: [], done: false };
+  const flown = globalThis.flown = { frames: 0, longest: 0, task: 0, gpu: 0, errors: [], triangles: [], pictures: [], done: false };
   let drawn = 0;
   for (const name of ['drawElements', 'drawElementsInstanced']) {
     const own = WebGL2RenderingContext.prototype[name];
@@ -47,7 +51,8 @@ FLY = """(async () => {
   }).observe({ type: 'longtask' });
   const began = performance.now();
   const modar = await load('%(bundle)s');
-  const view = await View.create(modar, { picture: canvas(640, 480), models: canvas(640, 480), fixedLight: true, maxBytes: %(bytes)d });
+  const models = canvas(640, 480);
+  const view = await View.create(modar, { picture: canvas(640, 480), models, fixedLight: true, maxBytes: %(bytes)d });
   await view.whole;
   flown.shown = (performance.now() - began) / 1000;
   const { low, high } = view.bounds(0);
@@ -63,25 +68,33 @@ FLY = """(async () => {
     const at = middle.map((x, i) => x + back[i] * (reach + size * (3 * (1 - near) + %(nearest)g * near))), dot = (a) => -a.reduce((sum, x, i) => sum + x * at[i], 0);
     return Float32Array.of(right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0, dot(right), dot(up), dot(back), 1);
   };
-  const start = performance.now();
-  for (let before = start, error = 0, third = 1; ;) {
-    const now = await new Promise(requestAnimationFrame), share = (now - start) / 1000 / %(seconds)g;
-    if (share >= 1) break;
+  const draw = (share) => {
     drawn = 0;
     view.drawFrom(0, from(share), 500);
-    if (flown.frames++ > 0) {
-      flown.longest = Math.max(flown.longest, now - before);
-      flown.pop = Math.max(flown.pop, error - view.lodError);
-    }
-    [before, error] = [now, view.lodError];
+    ++flown.frames;
     flown.gpu = Math.max(flown.gpu, view.gpuBytes);
-    if (share > third / 3) {
-      flown.triangles[third - 1] = drawn;
-      flown.errors[third++ - 1] = error;
+  };
+  const during = async (seconds, step) => {
+    const start = performance.now();
+    for (let before = start, now; (now = await new Promise(requestAnimationFrame)) - start < 1000 * seconds; before = now) {
+      flown.longest = Math.max(flown.longest, now - before);
+      step((now - start) / 1000 / seconds);
     }
+  };
+  for (const third of [0, 1, 2]) {
+    await during(%(seconds)g / 3, (part) => draw((third + part) / 3));
+    const held = [];
+    let shown = '';
+    await during(%(hold)g, () => {
+      draw((third + 1) / 3);
+      const what = `${drawn} ${view.lodError}`;
+      if (what !== shown) held.push(models.toDataURL());
+      shown = what;
+    });
+    flown.pictures.push(held);
+    flown.triangles.push(drawn);
+    flown.errors.push(view.lodError);
   }
-  flown.triangles.push(drawn);
-  flown.errors.push(view.lodError);
   flown.done = true;
 })().catch((error) => { globalThis.flown = { done: true, error: String(error.stack ?? error) }; }), 0"""
 
@@ -112,6 +125,30 @@ class Ranged(Quiet):
             pass  # the page has what it wants
 
 
+def pops(pictures):
+    """Of each picture after the first: how far squares of it moved, by their median, 95 and 99 %."""
+    import cv2
+    import numpy
+
+    def read(url):
+        picture = cv2.imdecode(numpy.frombuffer(base64.b64decode(url.split(",")[1]), numpy.uint8), cv2.IMREAD_UNCHANGED).astype(numpy.float32)
+        shown = picture[..., 3] / 255
+        return cv2.GaussianBlur(picture[..., :3].mean(2) * shown + 128 * (1 - shown), (0, 0), 1.5), shown
+    moved, window = [], cv2.createHanningWindow((SQUARE, SQUARE), cv2.CV_32F)
+    for (before, _), (after, shown) in itertools.pairwise(map(read, pictures)):
+        ways = []
+        for y, x in itertools.product(*(range(0, side + 1 - SQUARE, SQUARE // 2) for side in after.shape)):
+            square = numpy.s_[y:y + SQUARE, x:x + SQUARE]
+            if shown[square].mean() < 0.3 or before[square].std() < 2:
+                continue
+            way, sure = cv2.phaseCorrelate(before[square] - before[square].mean(), after[square] - after[square].mean(), window)
+            if sure > 0.3:
+                ways.append(math.hypot(*way))
+        if ways:
+            moved.append([round(float(numpy.percentile(ways, part)), 2) for part in (50, 95, 99)])
+    return moved
+
+
 def fly(site, bundle, options):
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Ranged, directory=str(site)))
     server.sent = 0
@@ -123,12 +160,13 @@ def fly(site, bundle, options):
         browser.open(f"http://localhost:{server.server_port}/blank.html")
         blank = sum(settle(browser).values())
         browser.throttle(options.line / 8, options.latency)
-        browser.run(FLY % {"bundle": "/" + bundle, "bytes": options.max_bytes, "seconds": options.seconds, "nearest": options.nearest})
-        most, end = 0, time.monotonic() + 300 + options.seconds
+        browser.run(FLY % {"bundle": "/" + bundle, "bytes": options.max_bytes, "seconds": options.seconds, "hold": options.hold, "nearest": options.nearest})
+        most, end = 0, time.monotonic() + 300 + options.seconds + 3 * options.hold
         while not browser.run("globalThis.flown?.done ?? false") and time.monotonic() < end:
             most = max(most, sum(resident_by_process(browser.process.pid).values()))
             time.sleep(1)
         flown = browser.run("globalThis.flown ?? {}")
+        flown["pops"] = [pops(held) for held in flown.pop("pictures", [])]
         flown.update(came_mb=server.sent / 1e6, rss_mb=(sum(settle(browser).values()) - blank) / 1e6, rss_most_mb=(most - blank) / 1e6)
         return flown
     finally:
@@ -145,6 +183,7 @@ def main():
     parser.add_argument("--line", type=float, default=10e6, help="bits a second")
     parser.add_argument("--latency", type=float, default=100, help="milliseconds")
     parser.add_argument("--seconds", type=float, default=60, help="of the flight")
+    parser.add_argument("--hold", type=float, default=20, help="seconds that the eye holds still after each third")
     parser.add_argument("--nearest", type=float, default=0.02, help="of the eye to the box around the scan, in longest sides of it")
     parser.add_argument("--page", help="of another build")
     parser.add_argument("--keep", type=pathlib.Path, help="a folder for the site, which is used again where it is there")
@@ -155,7 +194,7 @@ def main():
             make_site(site, options.bundle, options.page, False)
         bundle = json.loads((site / "site.json").read_text())["bundles"][0]["file"]
         flown = fly(site, bundle, options)
-        print(json.dumps({name: [round(x, 2) for x in value] if isinstance(value, list) else round(value, 2) if isinstance(value, float) else value
+        print(json.dumps({name: [round(x, 2) if isinstance(x, float) else x for x in value] if isinstance(value, list) else round(value, 2) if isinstance(value, float) else value
                           for name, value in {"bundle_mb": options.bundle.stat().st_size / 1e6,
                                               "packed_mb": (site / bundle.split("?")[0]).stat().st_size / 1e6, **flown}.items()}))
 

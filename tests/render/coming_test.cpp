@@ -164,7 +164,12 @@ class WantedTest : public ComingTest {
     ComingTest::SetUp();
     if (IsSkipped()) return;
     if (!probe_gl_caps().es3) GTEST_SKIP() << "needs ES 3";
-    bundle.emplace(two_kinds(512));
+    hold(two_kinds(512));
+  }
+
+  /// In memory is only what kept_ranges() names.
+  void hold(const BundleContent& content) {
+    bundle.emplace(content);
     ASSERT_TRUE(bundle->view);
     whole = bundle->file.bytes();
     memory.emplace(whole);
@@ -261,8 +266,9 @@ TEST_F(WantedTest, WithinABudget) {
   EXPECT_EQ(blue_pixels(picture(*renderer)), 0) << geometry << " bytes fit";
 }
 
-/// A red chunk whose coarser level, green, uses the first of its vertices, and a blue stand-in.
-BundleContent prefixes() {
+/// A red chunk whose coarser level, green, uses the first of its vertices, and a blue stand-in of
+/// the error 5. coarser: the green level's error.
+BundleContent prefixes(float coarser) {
   SceneMaker maker;
   const std::uint32_t material = maker.add_material(flat_material());
   const std::uint32_t layout = maker.add_layout(Layout::kHalfColoured);
@@ -276,49 +282,49 @@ BundleContent prefixes() {
   make_stand_in(content, 5.0f);
   std::swap(content.levels[0], content.levels[1]);
   content.levels[0].error = 0.0f;
-  content.levels[1].error = 0.05f;
+  content.levels[1].error = coarser;
   return content;
 }
 
-/// What has come for a coarser level is not brought again with the rest.
-TEST_F(WantedTest, LevelsShareTheFrontOfTheirVertices) {
-  const MappedBundle whole_bundle(prefixes());
-  ASSERT_TRUE(whole_bundle.view);
-  const auto all = whole_bundle.file.bytes();
-  Memory part(all);
-  std::fill(part.bytes().begin() + static_cast<std::ptrdiff_t>(gpu_start(part.view)),
-            part.bytes().end(), std::byte{0});
-  for (const StageRange& range : kept_ranges(part.view)) {
-    std::copy_n(all.begin() + static_cast<std::ptrdiff_t>(range.offset), range.size,
-                part.bytes().begin() + static_cast<std::ptrdiff_t>(range.offset));
+/// A view of prefixes().
+class PrefixTest : public WantedTest {
+ protected:
+  static constexpr std::array<int, 3> kRed = {255, 0, 0}, kGreen = {0, 255, 0}, kBlue = {0, 0, 255};
+
+  void open(float coarser) {
+    hold(prefixes(coarser));
+    renderer = start(1 << 20);
+    ASSERT_TRUE(renderer);
+    renderer->set_options(flat_light());
   }
-  GlCaps caps = probe_gl_caps();
-  caps.gpu_memory = 1 << 20;
-  auto made = Renderer::create_part(part.view, caps, Renderer::Part::kWanted);
-  ASSERT_TRUE(made) << made.error().cause;
-  Renderer& renderer = **made;
-  renderer.set_options(flat_light());
-  const auto seen = [&](float distance) {
+  /// The colour in the middle.
+  std::array<int, 3> seen(float distance) {
     const DrawItem item{0, glm::translate(glm::mat4(1.0f), {0.0f, 0.0f, -distance})};
-    const auto pixels = draw(renderer, default_camera(96, 72), std::span(&item, 1));
+    const auto pixels = draw(*renderer, default_camera(96, 72), std::span(&item, 1));
     const std::size_t middle = 4 * (36 * 96 + 48);
-    return std::array<int, 3>{pixels[middle], pixels[middle + 1], pixels[middle + 2]};
-  };
-  // Answers the bytes of vertices that were asked for.
-  const auto come = [&] {
+    return {pixels[middle], pixels[middle + 1], pixels[middle + 2]};
+  }
+  /// Brings what is wanted; answers the bytes of vertices that were asked for.
+  std::uint64_t come() {
     std::uint64_t vertices = 0;
-    const auto first =
-        static_cast<std::uint64_t>(part.view.vertices().data() - part.view.bytes().data());
+    const auto section = memory->view.vertices();
+    const auto first = static_cast<std::uint64_t>(section.data() - memory->view.bytes().data());
     for (;;) {
-      const Renderer::Wanted wanted = renderer.open_wanted();
+      const Renderer::Wanted wanted = renderer->open_wanted();
       if (wanted.number == kNone) return vertices;
-      renderer.put(wanted.offset, all.subspan(wanted.offset, wanted.size));
-      renderer.have(wanted.number);
-      if (wanted.offset - first < part.view.vertices().size()) vertices += wanted.size;
+      renderer->put(wanted.offset, whole.subspan(wanted.offset, wanted.size));
+      renderer->have(wanted.number);
+      if (wanted.offset - first < section.size()) vertices += wanted.size;
     }
-  };
-  constexpr std::array<int, 3> kRed = {255, 0, 0}, kGreen = {0, 255, 0}, kBlue = {0, 0, 255};
-  const std::uint64_t half = 6ull * part.view.layouts()[0].stride;
+  }
+
+  std::unique_ptr<Renderer> renderer;
+};
+
+/// What has come for a coarser level is not brought again with the rest.
+TEST_F(PrefixTest, LevelsShareTheFrontOfTheirVertices) {
+  open(0.05f);
+  const std::uint64_t half = 6ull * memory->view.layouts()[0].stride;
   EXPECT_EQ(seen(20), kBlue);
   EXPECT_EQ(come(), half) << "the coarser level's";
   EXPECT_EQ(seen(20), kGreen);
@@ -327,6 +333,18 @@ TEST_F(WantedTest, LevelsShareTheFrontOfTheirVertices) {
   EXPECT_EQ(seen(2), kRed);
   EXPECT_EQ(come(), 0u);
   EXPECT_EQ(seen(20), kGreen);
+}
+
+/// Stand-ins of a rough surface often state nearly the same error.
+TEST_F(PrefixTest, LevelsOfNearlyTheSameErrorComeOneAfterTheOther) {
+  for (const float error : {4.5f, 3.5f, 2.5f, 1.5f}) {
+    open(error);
+    EXPECT_EQ(seen(2), kBlue);
+    come();
+    EXPECT_EQ(seen(2), kGreen) << error;
+    come();
+    EXPECT_EQ(seen(2), kRed) << error;
+  }
 }
 
 TEST_F(WantedTest, NeedsAContextThatDrawsTexturesInPart) {
