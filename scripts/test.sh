@@ -20,7 +20,16 @@ case ${1:-} in
   *) echo "test.sh: unknown option '$1'; try --help" >&2; exit 1 ;;
 esac
 
+mkdir -p build
+spent=()
+# CPU-minutes so far, of this shell and its children.
+add_spent() {
+  times >build/times.txt  # user and system: 1m2.345s 0m1.234s
+  spent+=("$(awk '{ for (i = 1; i <= 2; i++) { split($i, t, /[ms]/); sum += 60 * t[1] + t[2] } } END { print sum / 60 }' build/times.txt)")
+}
+
 scripts/setup.sh "${packages[@]}"
+add_spent
 jobs=$(nproc)
 
 cmake --preset dev "-DMODAR_SANITIZE_SCOPES=$scopes"
@@ -29,6 +38,7 @@ cmake --build --preset dev -- -j "$jobs"
 # The phone's player must build without the workstation's libraries.
 cmake --preset device
 cmake --build --preset device -- -j "$jobs"
+add_spent
 
 log=build/dev/Testing/Temporary/LastTest.log
 status=0
@@ -38,7 +48,6 @@ echo "Skipped (see scripts/packages-test.txt and CONTRIBUTING.md):"
 { cat build/dev/skipped.txt
   sed -nE "s/^(test_[A-Za-z0-9_]+ .*) \.\.\. skipped (.*)/\1: \2/p; s/^\[  SKIPPED \] ([A-Za-z0-9_./]+) \([0-9]+ ms\)$/\1/p" "$log"
 } | sort -u | sed 's/^/  /' | grep . || echo "  nothing"
-times >build/times.txt  # of this shell and its children, user and system: 1m2.345s 0m1.234s
-awk '{ for (i = 1; i <= 2; i++) { split($i, t, /[ms]/); sum += 60 * t[1] + t[2] } }
-  END { printf "test.sh: %.1f CPU-minutes\n", sum / 60 }' build/times.txt
+add_spent
+awk '{ printf "test.sh: %.1f CPU-minutes: packages %.1f, building %.1f, testing %.1f\n", $3, $1, $2 - $1, $3 - $2 }' <<<"${spent[*]}"
 exit $status
