@@ -66,10 +66,10 @@ std::int64_t take_time(std::string_view& text) {
 const char* check_times(std::string_view line, std::int64_t& last) {
   const std::int64_t begin = take_time(line);
   if (begin < 0 || !take(line, " ") || !take(line, kArrow) || !take(line, " ")) {
-    return "it is no line of times, as 00:01.500 --> 00:04.000";
+    return "it is not a line of times like 00:01.500 --> 00:04.000";
   }
   const std::int64_t end = take_time(line);
-  if (end < 0 || !(line.empty() || line[0] == ' ')) return "its second time is none";
+  if (end < 0 || !(line.empty() || line[0] == ' ')) return "its second time is not a time";
   if (end <= begin) return "its end is not after its beginning";
   if (begin < last) return "it begins before the cue above";
   last = begin;

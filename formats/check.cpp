@@ -619,7 +619,7 @@ void check_draw_orders(FaultLog& log, const BundleParts& parts) {
     const LevelRecord& level = parts.levels[parts.chunks[entry.owner].first_level];
     if (is_tree({first, bytes.size() / sizeof *first}, level.index_count / 3)) continue;
     log.add(Rule::kChunkRange, entry.offset, "chunk " + std::to_string(entry.owner),
-            "its draw order is no tree that holds each triangle once");
+            "its draw order is not a tree that holds each triangle once");
   }
 }
 

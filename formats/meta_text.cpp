@@ -118,7 +118,7 @@ class JsonScan {
     const bool c1 =
         rest[0] == '\x7F' || (rest.size() > 1 && rest[0] == '\xC2' && utf8_continues(rest[1]));
     const std::size_t size = c1 ? (rest[0] == '\x7F' ? 1 : 2) : utf8_character(rest);
-    if (size == 0) return refuse("a byte belongs to no character of UTF-8 that a string may hold");
+    if (size == 0) return refuse("a byte is not part of a UTF-8 character that a string may hold");
     at_ += size;
     return true;
   }
@@ -135,13 +135,13 @@ class JsonScan {
     const int next = first_half && rest.size() > 6 ? code_unit(rest.substr(6)) : -1;
     const bool good = first_half ? next >= 0xDC00 && next < 0xE000
                                  : unit >= 0 && (unit < 0xDC00 || unit >= 0xE000);
-    if (!good) return refuse("an escape of a string is none of JSON's");
+    if (!good) return refuse("a string has an escape that JSON does not define");
     at_ += first_half ? 12 : 6;
     return true;
   }
 
   bool word(std::string_view expected) {
-    if (!text_.substr(at_).starts_with(expected)) return refuse("a value is none of JSON's");
+    if (!text_.substr(at_).starts_with(expected)) return refuse("a value is not a JSON value");
     at_ += expected.size();
     return true;
   }
@@ -181,13 +181,13 @@ class JsonScan {
       return refuse("a number is too long, or too great for some readers");
     }
     at_ = first;
-    return refuse("a value is none of JSON's");
+    return refuse("a value is not a JSON value");
   }
 
   /// What stands between brackets; the opening one is next.
   template <class Element>
   bool list(char close, Element element) {
-    if (++depth_ > kMaxMetaDepth) return refuse("arrays and objects are too deep in each other");
+    if (++depth_ > kMaxMetaDepth) return refuse("arrays and objects are nested too deeply");
     ++at_;
     if (peek() != close) {
       for (;;) {

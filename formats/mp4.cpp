@@ -50,7 +50,7 @@ class Mp4Reader {
 
   /// Each box inside `within`, which they fill.
   bool boxes(Bytes within, int depth, Mp4Track* track) {
-    if (depth > kMostDepth) return refuse(within, "boxes are too deep in each other");
+    if (depth > kMostDepth) return refuse(within, "boxes are nested too deeply");
     while (!within.empty()) {
       if (++count_ > kMostBoxes) return refuse(within, "there are too many boxes");
       if (within.size() < 8) return refuse(within, "a box has no room for its header");
@@ -64,7 +64,8 @@ class Mp4Reader {
         if (depth != 0) return refuse(within, "a box inside another has no size");
         size = within.size();
       }
-      if (size < head || size > within.size()) return refuse(within, "a box leaves what it is in");
+      if (size < head || size > within.size())
+        return refuse(within, "a box extends past the one that contains it");
       char type[5] = "";
       std::memcpy(type, within.data() + 4, 4);
       const Bytes body = within.subspan(head, static_cast<std::size_t>(size) - head);

@@ -70,7 +70,7 @@ constexpr IssueKind kIssueKinds[] = {
      kRebake},
     {"BUNDLE_SCENE", Severity::kError,
      "A scene refers to a pattern or model that does not exist, its rotation is not a unit "
-     "quaternion, or its light or shadow is none",
+     "quaternion, or its light or shadow is not valid",
      kRebake},
     {"LIGHT_VALUES", Severity::kError, "A light is negative, or varies more than light can",
      kRebake},
@@ -128,7 +128,8 @@ constexpr IssueKind kIssueKinds[] = {
      "The content summary differs from the records or payloads", kRebake},
     {"MEDIA_FILE", Severity::kError,
      "A video or sound is not what its record says, or not what every phone plays", kRebake},
-    {"CAPTIONS", Severity::kError, "Captions are no WebVTT file as bundles have it", kRebake},
+    {"CAPTIONS", Severity::kError, "Captions are not a WebVTT file of the kind that bundles hold",
+     kRebake},
     {"VERTEX_PADDING", Severity::kError, "Padding bytes of a vertex are not zero", kRebake},
     {"VERTEX_OCCLUSION", Severity::kError, "A vertex's occlusion is above 127", kRebake},
     {"PATTERN_YML_DIFFERS", Severity::kError,

@@ -17,10 +17,12 @@ std::optional<TrackerFault> check_header(const TrackerRecordHeader& header) {
   };
   if (header.feature_count > kMaxTrackerFeatures ||
       header.feature_count % kTrackerBlockCodes != 0) {
-    return fault(offsetof(TrackerRecordHeader, feature_count), "feature_count is no whole blocks");
+    return fault(offsetof(TrackerRecordHeader, feature_count),
+                 "feature_count does not fill whole blocks");
   }
   if (header.bright_count > header.feature_count || header.bright_count % kTrackerBlockCodes != 0) {
-    return fault(offsetof(TrackerRecordHeader, bright_count), "bright_count is no whole blocks");
+    return fault(offsetof(TrackerRecordHeader, bright_count),
+                 "bright_count does not fill whole blocks");
   }
   if (header.patch_count > kMaxTrackerPatches) {
     return fault(offsetof(TrackerRecordHeader, patch_count), "patch_count is too great");

@@ -177,7 +177,7 @@ void check_names(FaultLog& log, const BundleParts& parts) {
     if (length == 0) {
       const auto* at = reinterpret_cast<const std::byte*>(rest.data());
       log.add(Rule::kName, static_cast<std::uint64_t>(at - parts.bytes.data()), "names",
-              "a byte belongs to no printable character of UTF-8");
+              "a byte is not part of a printable UTF-8 character");
       return;
     }
     rest.remove_prefix(length);
@@ -318,7 +318,7 @@ void RecordCheck::name(const NameRef& ref) const {
       !starts_character(end)) {
     fault(Rule::kName, &ref,
           std::to_string(ref.length) + " bytes at " + std::to_string(ref.offset) +
-              " are no whole characters of the " + std::to_string(parts_.names.size()) +
+              " are not whole characters of the " + std::to_string(parts_.names.size()) +
               " bytes of names");
   }
 }
@@ -656,7 +656,7 @@ void check_texture(const RecordCheck& check, const TextureRecord& texture) {
       std::min(texture.source_width, texture.source_height) == 0) {
     check.fault(Rule::kTextureRange, &texture.width,
                 std::to_string(texture.width) + " x " + std::to_string(texture.height) +
-                    " pixels are no possible size");
+                    " pixels is not a possible size");
     return;
   }
   const auto chain = static_cast<std::uint32_t>(bit_width(side));
@@ -728,7 +728,7 @@ void check_pattern(const RecordCheck& check, const PatternRecord& pattern) {
   if (std::min(pattern.width, pattern.height) == 0 || side > kMaxPatternSide) {
     return check.fault(Rule::kPattern, &pattern.width,
                        std::to_string(pattern.width) + " x " + std::to_string(pattern.height) +
-                           " pixels are no possible size");
+                           " pixels is not a possible size");
   }
   const double half_width = static_cast<double>(pattern.width) / side;
   const double half_height = static_cast<double>(pattern.height) / side;
@@ -763,7 +763,7 @@ void check_parameter_set(const RecordCheck& check, const BundleParts& parts, std
   if (set.descriptor_bits == 0 || set.descriptor_bits % 8 != 0 ||
       set.descriptor_bits > kMaxDescriptorBits) {
     check.fault(Rule::kParameterSet, &set.descriptor_bits,
-                std::to_string(set.descriptor_bits) + " bits are no possible descriptor");
+                std::to_string(set.descriptor_bits) + " bits is not a possible descriptor size");
   }
 }
 
@@ -944,7 +944,7 @@ void check_scene(const RecordCheck& check, const BundleParts& parts, const Scene
     square += static_cast<double>(part) * static_cast<double>(part);
   }
   if (!(std::fabs(square - 1.0) <= 1e-4)) {
-    check.fault(Rule::kScene, scene.rotation, "its rotation is no unit quaternion");
+    check.fault(Rule::kScene, scene.rotation, "its rotation is not a unit quaternion");
   }
 }
 

@@ -134,7 +134,7 @@ void check_node(const RecordCheck& check, const BundleParts& parts, std::uint32_
     check.fault(Rule::kNode, &node.pattern, "a field does not fit its kind");
   }
   if (!unit_length(node.rotation)) {
-    check.fault(Rule::kNode, node.rotation, "its rotation is no unit quaternion");
+    check.fault(Rule::kNode, node.rotation, "its rotation is not a unit quaternion");
   }
   if (node.name.length == 0 || !alone(parts, index)) {
     check.fault(Rule::kNode, &node.name, "its name is empty, or it is there twice");

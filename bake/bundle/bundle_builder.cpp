@@ -281,7 +281,7 @@ void tell_positions(const ChunkedMesh& mesh, const PackedMesh& packed, PositionK
     std::snprintf(
         text, sizeof text,
         "half floats (%u bytes a vertex) move vertices by up to %.3g, %.0f %% of the mean "
-        "edge; 16-bit integers (%u bytes) would by %.3g at most",
+        "edge; 16-bit integers (%u bytes) would move them by at most %.3g",
         packed.layout.stride, error, 100 * error / edge,
         packed.layout.stride - (packed.occlusion_byte == kNone ? 4u : 0u),
         step * std::sqrt(0.75) * mesh.mesh.placement.scale);

@@ -293,7 +293,7 @@ Error usage_error(const CLI::ParseError& thrown, const CLI::Option* option,
     const std::string_view meant = nearest_name(value, choices);
     std::string list;
     for (const std::string& choice : choices) list += (list.empty() ? "" : ", ") + choice;
-    error.cause = quoted + " is none of its values";
+    error.cause = quoted + " is not one of its values";
     error.cure = meant.empty() ? "name one of " + list : "did you mean " + std::string(meant) + "?";
   } else {
     error.cause = quoted + (number_in(value) ? " is out of range" : " is not a number");

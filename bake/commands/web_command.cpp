@@ -28,11 +28,10 @@ void print_addresses(const WebCommand& command, const std::vector<std::string>& 
   for (const std::string& url : urls) std::printf("%s\n", url.c_str());
   std::fflush(stdout);
   if (command.quiet) return;
-  std::fprintf(
-      stderr,
-      "%s\nThe phone has to be in the same network. Its browser warns of the certificate, which "
-      "this command has made: go on all the same. Ctrl-C ends the server.\n",
-      qr_code(urls.front()).c_str());
+  std::fprintf(stderr,
+               "%s\nThe phone has to be in the same network. Its browser warns about the "
+               "certificate, which this command made: continue anyway. Ctrl-C ends the server.\n",
+               qr_code(urls.front()).c_str());
 }
 
 /// The newest release at an address as the page sees it: of the folder that is written, or the web.
@@ -57,8 +56,8 @@ void note_release(WebCommand& command) {
     command.options.release_version = release->version;
   } else if (!command.quiet) {
     std::fprintf(stderr,
-                 "warning: no release is read (%s): a first visitor's browser takes any, "
-                 "old ones too, until the page is made again\n",
+                 "warning: no release is read (%s): first visitors' browsers accept any release, "
+                 "even old ones, until the page is made again\n",
                  printable(release.error().cause).c_str());
   }
 }

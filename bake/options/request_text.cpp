@@ -308,7 +308,7 @@ tl::expected<void, WrongValue> parse_alpha(std::string_view text, NodeRequest& n
     node.key[i] = static_cast<float>(16 * high + low) / 255.0f;
   }
   if (!good) {
-    return tl::unexpected(WrongValue{"this is no kind of alpha",
+    return tl::unexpected(WrongValue{"this is not a kind of alpha",
                                      "write none, beside (the right half is the alpha of the left "
                                      "one) or a colour that is not seen, \"#00ff00\""});
   }

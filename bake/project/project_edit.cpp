@@ -55,7 +55,7 @@ bool is_utf8(std::string_view text) {
 
 Result<std::string> toml_of(const Json& value) {
   if (const auto text = value.text()) {
-    if (!is_utf8(*text)) return no_edit("the text is no UTF-8");
+    if (!is_utf8(*text)) return no_edit("the text is not UTF-8");
     return quoted(*text);
   }
   if (const auto truth = value.truth()) return std::string(*truth ? "true" : "false");

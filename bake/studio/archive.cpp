@@ -142,7 +142,7 @@ Result<void> unpack_entry(unzFile file, const std::string& folder, const Entry& 
                           std::uint64_t& left) {
   if (const auto good = check_name(entry.name); !good) {
     return bad_zip("zip.name", entry.name, "the archive has a name that leads elsewhere",
-                   "pack the files anew, by a program that you trust");
+                   "pack the files again, with a program that you trust");
   }
   MODAR_ASSIGN(const std::string path, place_inside(folder, entry.name));
   if (unzOpenCurrentFile(file) != UNZ_OK) return damaged(entry.name);

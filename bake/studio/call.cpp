@@ -66,7 +66,7 @@ Answer answer_of(const Error& error) {
 }
 
 Error unknown_verb(const Call& call) {
-  return {ExitCode::kUsage, "studio.unknown", call.path, "the studio has nothing of this name",
+  return {ExitCode::kUsage, "studio.unknown", call.path, "the studio has nothing with this name",
           "reload the page"};
 }
 

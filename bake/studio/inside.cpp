@@ -42,7 +42,7 @@ bool lies_in(const fs::path& path, const std::string& folder) {
 Result<void> check_name(std::string_view name) {
   if (name.empty() || name.size() > kLongestName) return bad_name(name, "the name is too long");
   if (!is_readable(name) || name.find('\\') != std::string_view::npos) {
-    return bad_name(name, "the name has characters that are none of a file name");
+    return bad_name(name, "the name has characters that file names cannot have");
   }
   for (std::size_t begin = 0; begin <= name.size();) {
     const std::size_t end = std::min(name.find('/', begin), name.size());

@@ -175,10 +175,10 @@ Result<Export> export_of(Session& session, const std::string& kind, const Json& 
   } else if (kind == "apk") {
     const std::string script = app_script();
     if (script.empty()) {
-      return fail(
-          ExitCode::kUnsupported, "studio.package", "apk",
-          "an Android app is compiled from ModAR's sources, which this program came without",
-          "start the studio from its sources, or make the web page, which needs no app");
+      return fail(ExitCode::kUnsupported, "studio.package", "apk",
+                  "an Android app is compiled from ModAR's sources, which are not installed with "
+                  "this program",
+                  "start the studio from its sources, or make the web page, which needs no app");
     }
     // Without it the script makes an APK that no phone can start.
     if (std::getenv("ANDROID_NDK") == nullptr) {
@@ -220,7 +220,7 @@ void publish_command_failure(Session& session, const Job& job, const Ran& ran) {
   for (std::size_t i = 0; i < packages.size(); ++i) names += " " + *packages.at(i)->text();
   Json told =
       json_of(Error{ExitCode::kUnsupported, "studio.package", job.kind,
-                    "this machine lacks programs that it takes", "sudo apt-get install" + names});
+                    "this machine lacks programs that this needs", "sudo apt-get install" + names});
   told.set("job", job.number);
   told.set("kind", job.kind);
   told.set("package", packages);

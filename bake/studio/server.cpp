@@ -312,7 +312,7 @@ struct StudioServer::Parts {
     // A form of another page cannot have this type.
     if (!request.get_header_value("Content-Type").starts_with("application/json")) {
       return send(answer_of(Error{ExitCode::kUsage, "studio.request", call.path,
-                                  "the request is no JSON", "reload the page"}),
+                                  "the request is not JSON", "reload the page"}),
                   response);
     }
     bool whole = true;
@@ -335,7 +335,7 @@ struct StudioServer::Parts {
     Incoming file(options.incoming);
     if (!file.open()) {
       return send(answer_of(Error{ExitCode::kIo, "io.write", options.incoming,
-                                  "the file cannot be kept", "make room on the disk"}),
+                                  "the file cannot be saved", "make room on the disk"}),
                   response);
     }
     Result<void> kept;

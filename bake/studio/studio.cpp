@@ -33,7 +33,7 @@ Result<std::string> find_studio_page() {
     if (fs::exists(folder / "index.html")) return folder.lexically_normal().string();
   }
   return fail(ExitCode::kUnsupported, "studio.page", programs.string(),
-              "the studio's page does not lie beside the programs",
+              "the studio's page is not next to the programs",
               "install the package again; from the source: scripts/setup.sh web, and build again");
 }
 

@@ -86,7 +86,7 @@ Result<std::string> settle(const Session& session, const std::string& from,
     }
     if (errno != EEXIST) {
       return fail(ExitCode::kIo, "io.write", candidate,
-                  std::string("the file cannot be kept: ") + std::strerror(errno),
+                  std::string("the file cannot be saved: ") + std::strerror(errno),
                   "make room on the disk and try again");
     }
     if (same_bytes(from, path)) return candidate;

@@ -63,8 +63,8 @@ Answer show_folder(Session& session) {
   };
   const bool desktop = is_set("DISPLAY") || is_set("WAYLAND_DISPLAY");
   if (desktop && run_process({{"xdg-open", folder}, {}, {}}) == 0) return answer_of(Json::object());
-  return answer_of(Error{ExitCode::kUnsupported, "studio.show", "",
-                         "no program that shows folders answers", "open it yourself: " + folder});
+  return answer_of(Error{ExitCode::kUnsupported, "studio.show", "", "no file manager responds",
+                         "open it yourself: " + folder});
 }
 
 Answer answer_get(Session& session, const Call& call) {
@@ -89,7 +89,7 @@ Answer answer_get(Session& session, const Call& call) {
 Answer answer_post(Session& session, const Call& call) {
   const Json body = Json::parse(call.body);
   if (body.is_null()) {
-    return answer_of(Error{ExitCode::kUsage, "studio.request", call.path, "the request is no JSON",
+    return answer_of(Error{ExitCode::kUsage, "studio.request", call.path, "the request is not JSON",
                            "reload the page"});
   }
   if (call.path == "api/edit") return edit(session, body);

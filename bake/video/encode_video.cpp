@@ -104,7 +104,7 @@ Result<EncodedMedia> run_encoder(const std::string& path, const std::vector<std:
   words.push_back(out);
   if (run_process({words, {}, ""}) != 0) {
     return fail(ExitCode::kUnsupported, "video.ffmpeg", path,
-                "FFmpeg could not encode it as H.264 (libx264) and AAC; its words are above",
+                "FFmpeg could not encode it as H.264 (libx264) and AAC; its messages are above",
                 "install an FFmpeg with libx264, as Debian's is");
   }
   EncodedMedia media;

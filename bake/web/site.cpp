@@ -359,7 +359,7 @@ Result<Json> links_of(const SiteOptions& options) {
     const std::size_t equals = link.find('=');
     const std::string url = equals == std::string::npos ? "" : link.substr(equals + 1);
     if (equals == 0 || !is_link_address(url)) {
-      return fail(ExitCode::kUsage, "web.link", link, "this is no text with an address",
+      return fail(ExitCode::kUsage, "web.link", link, "this is not a text with an address",
                   "write --link 'Imprint=https://museum.org/imprint'");
     }
     links.push_back({{"text", link.substr(0, equals)}, {"url", url}});

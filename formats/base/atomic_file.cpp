@@ -116,7 +116,7 @@ Result<void> AtomicFile::write(std::span<const std::byte> bytes) {
 Result<void> AtomicFile::commit() {
   const auto failed = [this](const char* deed) {
     return fail(ExitCode::kIo, "io.commit", path_, reason(deed, errno),
-                "check the disk; the old file, if there was one, still stands");
+                "check the disk; the old file, if there was one, is unchanged");
   };
   if (descriptor_ < 0) {
     return fail(ExitCode::kInternal, "io.commit", path_, "the file was committed before", "");
@@ -132,7 +132,7 @@ Result<void> AtomicFile::commit() {
   temporary_.clear();
   if (!sync_folder_of(path_)) {
     return fail(ExitCode::kIo, "io.commit", path_, reason("cannot sync the folder", errno),
-                "the new file stands, but may not survive a power cut; check the disk");
+                "the new file is written, but may not survive a power cut; check the disk");
   }
   return {};
 }

@@ -184,7 +184,7 @@ jstring name_of(JNIEnv* env, jlong number, jint index,
   if (!session) return nullptr;
   if (index < 0 ||
       name(session->bundle, static_cast<std::uint32_t>(index), text.data(), text.size()) == 0) {
-    misuse(env, "android.index", "index", "the bundle has nothing of that number", "count first");
+    misuse(env, "android.index", "index", "the bundle has nothing with that number", "count first");
     return nullptr;
   }
   return java_text(env, text.data());
@@ -623,7 +623,7 @@ MODAR_NATIVE(void, addPattern)
   auto asked = modar::sized<modar_scene>();
   if (scene < 0 ||
       modar_scene_at(session->bundle, static_cast<std::uint32_t>(scene), &asked) == 0) {
-    return misuse(env, "android.index", "scene", "the bundle has nothing of that number",
+    return misuse(env, "android.index", "scene", "the bundle has nothing with that number",
                   "count first");
   }
   Own own{{modar_record_open(record.get(), static_cast<std::size_t>(env->GetArrayLength(bytes)),

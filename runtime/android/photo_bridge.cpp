@@ -63,8 +63,8 @@ MODAR_NATIVE(jbyteArray, photoRecord)
   int flat_height = 0;
   if (modar_photo_flat(rgba.data(), width, height, points.data(), gray.data(), &flat_width,
                        &flat_height) == 0) {
-    throw_error(env, MODAR_USAGE, "android.corners", "corners", "they are no convex quadrangle",
-                "drag them onto the picture's");
+    throw_error(env, MODAR_USAGE, "android.corners", "corners",
+                "they are not a convex quadrilateral", "drag them onto the picture's");
     return nullptr;
   }
   auto error = modar::sized<modar_error>();

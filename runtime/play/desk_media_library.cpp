@@ -170,7 +170,7 @@ class VideoClip final : public ClipReader {
 
   Result<void> open() {
     if (!file_.whole()) {
-      return fail(ExitCode::kIo, "input.open", name_, "there is no memory for the video",
+      return fail(ExitCode::kIo, "input.open", name_, "there is not enough memory for the video",
                   "free some");
     }
     MODAR_TRY(restart());

@@ -69,7 +69,7 @@ class FfmpegSound final : public SoundReader {
     AVFormatContext* format = avformat_alloc_context();
     if (io_ == nullptr || format == nullptr) return "there is no memory for it";
     format->pb = io_.get();
-    if (avformat_open_input(&format, "", nullptr, nullptr) < 0) return "it is no file of sound";
+    if (avformat_open_input(&format, "", nullptr, nullptr) < 0) return "it is not a sound file";
     format_.reset(format);
     const AVCodec* codec = nullptr;
     stream_ = av_find_best_stream(format, AVMEDIA_TYPE_AUDIO, -1, -1, &codec, 0);
@@ -83,7 +83,7 @@ class FfmpegSound final : public SoundReader {
                         avcodec_open2(codec_.get(), codec, nullptr) >= 0;
     if (!opened || codec_->sample_rate <= 0) return "its decoder cannot be opened";
     // AAC decodes to separate channels of floats, and bundles have nothing else.
-    return codec_->sample_fmt == AV_SAMPLE_FMT_FLTP ? nullptr : "its samples are no floats";
+    return codec_->sample_fmt == AV_SAMPLE_FMT_FLTP ? nullptr : "its samples are not floats";
   }
 
   [[nodiscard]] int rate() const override { return codec_->sample_rate; }

@@ -113,7 +113,7 @@ class CameraSource final : public FrameSource {
   [[nodiscard]] tl::unexpected<Error> failed(const char* what, int error) const {
     return fail(ExitCode::kIo, "input.read", name_,
                 std::string("the camera does not ") + what + ": " + std::strerror(error),
-                "end what else uses it");
+                "close the program that uses it");
   }
 
   Result<void> require_capture() {
@@ -258,7 +258,7 @@ Result<int> camera_number(const std::string& input) {
   const auto [last, error] = std::from_chars(first, end, number);
   if (error == std::errc() && last == end && number >= 0) return number;
   return fail(ExitCode::kUsage, "input.camera", input, "it is not a camera",
-              "say camera, or camera:1 for the second one");
+              "write camera, or camera:1 for the second one");
 }
 
 }  // namespace modar

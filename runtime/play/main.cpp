@@ -24,7 +24,7 @@ Result<void> print_line(const std::string& line) {
                        std::fputc('\n', stdout) != EOF && std::fflush(stdout) == 0;
   if (written) return {};
   return fail(ExitCode::kIo, "out.write", "standard output", "it takes no more text",
-              "free space or mend the pipe");
+              "free space, or fix the pipe");
 }
 
 namespace {
@@ -76,7 +76,7 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
   if (options.method == "paper" && !options.quiet) {
     std::fprintf(
         stderr,
-        "modar-play: the ModAR paper's method is there to compare with: it reports patterns "
+        "modar-play: the ModAR paper's method is included for comparison: it reports patterns "
         "in frames that show none as well\n");
   }
   MODAR_ASSIGN(const std::uint32_t set,

@@ -135,7 +135,7 @@ Result<void> validate(const PlayOptions& options) {
     return usage("usage.conflict", "--live", "recordings and turntables are of one bundle");
   }
   if (!options.gyro.empty() && !options.extended) {
-    return usage("usage.conflict", "--gyro", "it helps --extended, which is not given");
+    return usage("usage.conflict", "--gyro", "it has no effect without --extended");
   }
   if (!options.method.empty() && options.method != "ours" && options.method != "paper") {
     return usage("usage.method", "--method",

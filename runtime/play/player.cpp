@@ -401,7 +401,7 @@ Result<int> Player::finish(const PipelineCounts& counts) {
   if (interrupted) {
     return fail(ExitCode::kIo, "play.interrupted", input_of(options_),
                 "the run was interrupted after " + std::to_string(stats_.frames()) + " frames",
-                "what was asked for is whole, of these frames; start it again for all");
+                "the output is complete for these frames; run it again for all of them");
   }
   return golden_ && !golden_->good() ? kExitDifferent : 0;
 }

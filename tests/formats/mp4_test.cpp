@@ -46,10 +46,10 @@ TEST(Mp4, RefusesWhatIsCutOff) {
 TEST(Mp4, RefusesBoxesThatDoNotFit) {
   Bytes bytes = small_mp4(640, 360, 12);
   bytes[0] = std::byte{0xFF};  // the size of the first box
-  EXPECT_EQ(fault_of(bytes), "a box leaves what it is in");
+  EXPECT_EQ(fault_of(bytes), "a box extends past the one that contains it");
   bytes = small_mp4(640, 360, 12);
   bytes[3] = std::byte{7};
-  EXPECT_EQ(fault_of(bytes), "a box leaves what it is in");
+  EXPECT_EQ(fault_of(bytes), "a box extends past the one that contains it");
   bytes = small_mp4(640, 360, 12);
   bytes[4] = std::byte{'x'};
   EXPECT_EQ(fault_of(bytes), "it does not begin as an MP4 file (ftyp)");

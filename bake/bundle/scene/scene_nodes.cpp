@@ -82,7 +82,8 @@ Result<void> check_command(const ActionRequest& action, const Known& target) {
   const bool play =
       action.command == ActionCommand::kPlay || action.command == ActionCommand::kPause;
   if (play && target.kind != NodeKind::kVideo && target.kind != NodeKind::kSound) {
-    return cannot(action, "is no video or sound", "name one, [[scene.video]] or [[scene.sound]]");
+    return cannot(action, "is not a video or sound",
+                  "name one, [[scene.video]] or [[scene.sound]]");
   }
   if (!play && target.kind == NodeKind::kSound) {
     return cannot(action, "is a sound, which only plays and pauses", "write play or pause");
@@ -107,7 +108,7 @@ Result<void> check_actions(const BakeRequest& request, std::vector<Known>& known
       source->asked = true;
       if (!action.part.empty() && source->kind != NodeKind::kModel) {
         return fail(ExitCode::kUsage, "action.part", action.where,
-                    "'" + action.source + "' is no model and has no parts", "leave part out");
+                    "'" + action.source + "' is not a model and has no parts", "leave part out");
       }
     }
     if (action.command == ActionCommand::kLink) continue;

@@ -403,10 +403,10 @@ Result<void> require_text(const ByteSource& source, const std::string& label) {
     const bool zeros = got >= static_cast<std::int64_t>(looked) &&
                        std::memcmp(bytes.data(), kZeros.data(), looked) == 0;
     if (zeros) {
-      return fail(
-          ExitCode::kInvalidInput, "obj.not-text", label,
-          "it has zeros at byte " + std::to_string(at + 1) + ": no text, or a copy that broke off",
-          "copy or export it again");
+      return fail(ExitCode::kInvalidInput, "obj.not-text", label,
+                  "it has zeros at byte " + std::to_string(at + 1) +
+                      ": not a text file, or an incomplete copy",
+                  "copy or export it again");
     }
   }
   return {};
