@@ -339,16 +339,16 @@ TEST(Prints, OneThatAgreesHereAndThereIsNotShown) {
   tracker::PatchCache patches;
   tracker::Track track;
   track.pose = pose_of(look_at(2.8, 10, 20, 10));
-  const auto verify = [&](double own_share, bool strewn) {
+  // own_share: how much of a cell is the pattern's own.
+  const auto verify = [&](auto own_share) {
     cv::Mat print = picture().clone();
     const cv::Mat other = textured_picture(300, 240, 904);
     for (int cell = 0; cell < 64; ++cell) {
       const int x = cell % 8;
       const int y = cell / 8;
-      const bool own = strewn ? (2 * x + y) % 5 < 2 : x < 3;
+      const double own = own_share(x, y);
       const cv::Rect place = cv::Rect(x * 75 / 2, y * 30, 38, 30) & cv::Rect(0, 0, 300, 240);
-      cv::addWeighted(picture()(place), own ? own_share : 0, other(place), own ? 1 - own_share : 1,
-                      0, print(place));
+      cv::addWeighted(picture()(place), own, other(place), 1 - own, 0, print(place));
     }
     Random random(5);
     const SceneFrame scene = render_still(gray(print), camera, track.pose,
@@ -359,13 +359,22 @@ TEST(Prints, OneThatAgreesHereAndThereIsNotShown) {
                                  track, false);
   };
   constexpr double kRough = 0.47;
-  const auto rough = verify(kRough, true);
+  const auto rough = verify([](int x, int y) { return (2 * x + y) % 5 < 2 ? kRough : 0.0; });
   EXPECT_EQ(rough.reason, Reason::kFailedVerification) << rough.agreeing << " " << rough.likeness;
-  const auto strewn = verify(1, true);
+  const auto strewn = verify([](int x, int y) { return (2 * x + y) % 5 < 2 ? 1.0 : 0.0; });
   EXPECT_EQ(strewn.reason, Reason::kVisible) << strewn.agreeing;
-  const auto whole = verify(1, false);
+  const auto whole = verify([](int x, int) { return x < 3 ? 1.0 : 0.0; });
   EXPECT_EQ(whole.reason, Reason::kVisible) << whole.agreeing;
   EXPECT_LT(whole.agreeing, 0.5);
+  // As a sheet of markers and a grid of codes do: two thirds agree, each cell as it happens.
+  constexpr double kUneven = 0.52;
+  const auto grid = verify([](int x, int y) { return (3 * x + 2 * y) % 5 > 0 ? kUneven : 0.0; });
+  EXPECT_GT(grid.agreeing, 0.6);
+  EXPECT_LT(grid.agreeing, 0.8);
+  EXPECT_EQ(grid.reason, Reason::kFailedVerification) << grid.agreeing << " " << grid.likeness;
+  const auto most = verify([](int x, int) { return x < 5 ? 1.0 : 0.0; });
+  EXPECT_GT(most.agreeing, 0.6);
+  EXPECT_EQ(most.reason, Reason::kVisible) << most.agreeing;
 }
 
 TEST(Prints, APoseThatItsPatchesContradictIsNotShown) {
