@@ -28,8 +28,7 @@ constexpr int kLooks = 3;
 constexpr std::uint32_t kDetailStride = 97;  // spreads the cells; coprime to their number
 // Printed cells from which on all that are connected with them differ, also those that are too fine
 // to tell or show nothing: letters of another title seldom fill a cell. Not beside the print's
-// edge, where a finger that lies still passes for printed (pose_loop_prints_test). Another title
-// was shown in 31 % of the frames after two seconds, 40 % where printed cells alone counted.
+// edge, where a finger that lies still passes for printed (pose_loop_prints_test).
 constexpr int kSurePrinted = 2;
 // How many times less than its samples the frame may resolve.
 constexpr double kResolved = 1.01;
@@ -62,6 +61,20 @@ bool edge_agrees(int at, const CellSamples& expected, const CellSamples& seen) {
   const CellMatch match = compare(outer_expected, outer_seen);
   return match.correlation >= kDetailAgrees ||
          (match.expected_contrast < kTexturedCell && match.seen_contrast < kPlainSeen);
+}
+
+/// Whether a cell does not lie at the print's edge.
+bool inside(int at) {
+  const int x = at % PrintDetails::kSide;
+  const int y = at / PrintDetails::kSide;
+  return std::min(x, y) > 0 && std::max(x, y) < PrintDetails::kSide - 1;
+}
+
+/// The cell, among those of half the size, that is this quarter of a cell.
+int quarter_of(int at, int quarter) {
+  const int x = 2 * (at % PrintDetails::kSide) + quarter % 2;
+  const int y = 2 * static_cast<int>(at / PrintDetails::kSide) + static_cast<int>(quarter / 2);
+  return y * 2 * PrintDetails::kSide + x;
 }
 
 }  // namespace
@@ -98,11 +111,22 @@ void PrintDetails::update(Cell& cell, const CellMatch& match, bool coarse, const
   }
 }
 
+/// Goes on where what was compared says no more; a cell agrees as its last quarter does.
+void PrintDetails::next_quarter(Cell& cell) {
+  if (cell.state == CellState::kDiffers || cell.state == CellState::kPrinted) return;
+  const bool last = cell.quarter == 4;
+  const bool done = cell.state == CellState::kAgrees || cell.state == CellState::kPlain;
+  cell.state = last && done ? CellState::kAgrees : CellState::kForeign;
+  cell.quarter = static_cast<std::uint8_t>(last ? 1 : cell.quarter + 1);
+}
+
 void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
                         std::span<const GrayImage> pyramid, const glm::vec3& from, int count) {
   if (!print.surface.flat()) return;
-  const CellGrid grid(print, map, pyramid, kSide);
-  if (grid.spread() > kResolved) return;
+  const CellGrid whole(print, map, pyramid, kSide);
+  if (whole.spread() > kResolved) return;
+  const CellGrid quarters(print, map, pyramid, 2 * kSide);
+  const bool closer = quarters.spread() <= kResolved;
   CellSamples expected{};
   CellSamples blurred{};
   CellSamples seen{};
@@ -110,19 +134,29 @@ void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
     const std::uint32_t at = next_ * kDetailStride % kDetailCells;
     Cell& cell = cells_[at];
     if (cell.state == CellState::kAgrees || cell.state == CellState::kPlain) continue;
+    const bool part = cell.quarter > 0;
+    if (part && !closer) continue;
     --count;
-    if (!grid.see(static_cast<int>(at), seen)) continue;
-    CellGrid::expect(print, static_cast<int>(at), expected, nullptr, 1.0, kSide);
+    const int side = part ? 2 * kSide : kSide;
+    const int which =
+        part ? quarter_of(static_cast<int>(at), cell.quarter - 1) : static_cast<int>(at);
+    if (!(part ? quarters : whole).see(which, seen)) continue;
+    CellGrid::expect(print, which, expected, nullptr, 1.0, side);
     CellMatch match = compare(expected, seen);
     bool coarse = true;
     if (match.correlation < kDetailAgrees && match.expected_contrast >= kDetailed) {
-      CellGrid::expect(print, static_cast<int>(at), blurred, nullptr, kBlur, kSide);
+      CellGrid::expect(print, which, blurred, nullptr, kBlur, side);
       match.correlation = std::max(match.correlation, compare(blurred, seen).correlation);
       coarse = compare(expected, blurred).correlation >= kCoarse;
     }
     update(cell, match, coarse, seen, from);
-    if (cell.state == CellState::kAgrees || cell.edge_agrees) continue;
-    cell.edge_agrees = edge_agrees(static_cast<int>(at), expected, seen);
+    if (!part && cell.state != CellState::kAgrees && !cell.edge_agrees) {
+      cell.edge_agrees = edge_agrees(static_cast<int>(at), expected, seen);
+    }
+    // At the print's edge the half there must agree before, or a quarter would let in all that is
+    // connected with it: 5 of 24 other titles were shown then, 2 with this.
+    if (part || (!coarse && closer && (inside(static_cast<int>(at)) || cell.edge_agrees)))
+      next_quarter(cell);
   }
 }
 

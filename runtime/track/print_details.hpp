@@ -14,6 +14,7 @@ namespace modar::tracker {
 
 /// Compares cells of half the verifier's size with the frame, a few in each frame.
 ///
+/// A cell that is too fine to tell is compared quarter by quarter, where the frame resolves them.
 /// A cell that agreed once is the pattern's. One that never does, but shows the same from two
 /// directions, is a printed difference, if cells that agree surround it: what covers a print
 /// reaches in from the print's edge, so cells that disagree and are connected with the edge say
@@ -42,12 +43,14 @@ class PrintDetails {
   struct Cell {
     CellState state = CellState::kUnseen;
     std::uint8_t looks = 0;    ///< that showed the same
+    std::uint8_t quarter = 0;  ///< 1 to 4: that is compared, as the whole is too fine to tell
     bool edge_agrees = false;  ///< its half at the print's edge showed the pattern once
     glm::vec3 from{};          ///< direction from which `shown` was seen
     std::array<std::uint8_t, kCellSamples * kCellSamples> shown{};
   };
   static void update(Cell& cell, const CellMatch& match, bool coarse, const CellSamples& seen,
                      const glm::vec3& from);
+  static void next_quarter(Cell& cell);
 
   std::array<Cell, kDetailCells> cells_;
   std::uint32_t next_ = 0;

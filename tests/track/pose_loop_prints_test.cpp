@@ -164,6 +164,32 @@ TEST(Prints, WhatIsConnectedWithPrintedDifferencesDiffers) {
   EXPECT_EQ(differences(*print, seen), 9);
 }
 
+// A stroke narrower than a sample of a whole cell in each quarter: upright, or lying in another
+// print.
+TEST(Prints, WhatIsTooFineForACellIsComparedQuarterByQuarter) {
+  const int side = kDetailPixels * tracker::PrintDetails::kSide;
+  cv::Mat own = textured_picture(side, side, 41);
+  const auto strokes = [](cv::Mat& print, int left, int top, bool upright) {
+    cv::Mat cells = print(detail(left, top, 5, 1));
+    cells.setTo(235);
+    for (int k = 4; k < (upright ? cells.cols : cells.rows); k += kDetailPixels / 2) {
+      (upright ? cells.colRange(k, k + 3) : cells.rowRange(k, k + 3)).setTo(20);
+    }
+  };
+  for (const int top : {0, 6}) strokes(own, 6, top, true);
+  const auto bytes = record_of(own);
+  const auto print = tracker::view_tracked_pattern(bytes, 0);
+  ASSERT_TRUE(print) << to_line(print.error());
+  EXPECT_EQ(differences(*print, own), 0);
+  cv::Mat seen = own.clone();
+  strokes(seen, 6, 6, false);
+  EXPECT_GE(differences(*print, seen), 4);
+  // From the print's edge inwards they may be a finger's.
+  seen = own.clone();
+  strokes(seen, 6, 0, false);
+  EXPECT_EQ(differences(*print, seen), 0);
+}
+
 TEST(Prints, TheTitleItselfStaysWhenHeldAndWhenCovered) {
   const cv::Mat own = titled("SOMMER");
   const auto bundle = bundle_with({record_of(own)});
