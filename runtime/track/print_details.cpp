@@ -34,8 +34,8 @@ constexpr int kSurePrinted = 2;
 constexpr double kResolved = 1.01;
 
 /// Whether the half of a cell that lies at the print's edge shows the pattern, or nothing where the
-/// pattern shows nothing: then what differs in the cell does not reach in from outside. False in a
-/// corner.
+/// pattern shows nothing: then what differs in the cell does not reach in from outside. True away
+/// from the edge, false in a corner.
 bool edge_agrees(int at, const CellSamples& expected, const CellSamples& seen) {
   const int x = at % PrintDetails::kSide;
   const int y = at / PrintDetails::kSide;
@@ -43,7 +43,8 @@ bool edge_agrees(int at, const CellSamples& expected, const CellSamples& seen) {
   const bool right = x == PrintDetails::kSide - 1;
   const bool top = y == 0;
   const bool bottom = y == PrintDetails::kSide - 1;
-  if (left + right + top + bottom != 1) return false;
+  const int sides = left + right + top + bottom;
+  if (sides != 1) return sides == 0;
   // The inner half is a copy of the outer one, so that both count alike.
   constexpr int kLast = kCellSamples - 1;
   CellSamples outer_expected{};
@@ -61,13 +62,6 @@ bool edge_agrees(int at, const CellSamples& expected, const CellSamples& seen) {
   const CellMatch match = compare(outer_expected, outer_seen);
   return match.correlation >= kDetailAgrees ||
          (match.expected_contrast < kTexturedCell && match.seen_contrast < kPlainSeen);
-}
-
-/// Whether a cell does not lie at the print's edge.
-bool inside(int at) {
-  const int x = at % PrintDetails::kSide;
-  const int y = at / PrintDetails::kSide;
-  return std::min(x, y) > 0 && std::max(x, y) < PrintDetails::kSide - 1;
 }
 
 /// The cell, among those of half the size, that is this quarter of a cell.
@@ -155,8 +149,7 @@ void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
     }
     // At the print's edge the half there must agree before, or a quarter would let in all that is
     // connected with it: 5 of 24 other titles were shown then, 2 with this.
-    if (part || (!coarse && closer && (inside(static_cast<int>(at)) || cell.edge_agrees)))
-      next_quarter(cell);
+    if (part || (!coarse && closer && cell.edge_agrees)) next_quarter(cell);
   }
 }
 

@@ -44,7 +44,7 @@ class PrintDetails {
     CellState state = CellState::kUnseen;
     std::uint8_t looks = 0;    ///< that showed the same
     std::uint8_t quarter = 0;  ///< 1 to 4: that is compared, as the whole is too fine to tell
-    bool edge_agrees = false;  ///< its half at the print's edge showed the pattern once
+    bool edge_agrees = false;  ///< its half at the print's edge did once, or it has none
     glm::vec3 from{};          ///< direction from which `shown` was seen
     std::array<std::uint8_t, kCellSamples * kCellSamples> shown{};
   };
