@@ -291,6 +291,9 @@ void tell_positions(const ChunkedMesh& mesh, const PackedMesh& packed, PositionK
       {"model.positions", DiagnosticSeverity::kInfo, packed.name, 0, text, cure});
 }
 
+/// Phones draw the finest level of models of fewer triangles.
+constexpr std::size_t kDrawnWhole = 1'000'000;
+
 /// A model in its bytes.
 struct ShapedModel {
   PackedMesh model;
@@ -299,10 +302,11 @@ struct ShapedModel {
 
 /// Packs stand-ins, each with the error of the whole.
 Result<std::vector<PackedMesh>> pack_stand_ins(const ChunkedMesh& mesh,
+                                               const std::vector<StandInStart>& starts,
                                                const StandInOptions& options,
                                                const std::vector<std::uint32_t>& texture_sides,
                                                const PackOptions& pack_options, Report& report) {
-  MODAR_ASSIGN(const std::vector<StandIn> made, make_stand_ins(mesh, options, report));
+  MODAR_ASSIGN(const std::vector<StandIn> made, make_stand_ins(mesh, starts, options, report));
   if (!made.empty()) {
     double& greatest = report.levels.back().position_error_max;
     greatest = std::max(greatest, made.back().error * mesh.mesh.placement.scale);
@@ -332,6 +336,9 @@ Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& 
   chunk_options.max_vertices = chunk_vertices_for(mesh.positions.size());
   Result<ChunkedMesh> chunked = chunk(std::move(mesh), chunk_options, report);
   if (!chunked) return tl::unexpected(chunked.error());
+  if (request.occlusion) {
+    chunked->mesh.occlusion = measure_occlusion(*chunked, request.jobs, report);
+  }
   LevelOptions level_options;
   level_options.levels = request.levels;
   level_options.positions = plan->kind;
@@ -339,22 +346,19 @@ Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& 
   level_options.texture_sides = texture_sides;
   const StandInPlan stand_ins = plan_stand_ins(*chunked, level_options);
   if (!stand_ins.halvings.empty()) level_options.most_halvings = stand_ins.halvings[0] - 1;
-  if (auto made = make_levels(*chunked, level_options, report); !made) {
-    return tl::unexpected(made.error());
-  }
+  level_options.start = stand_ins.start;
+  MODAR_ASSIGN(const std::vector<StandInStart> starts,
+               make_levels(*chunked, level_options, report));
   drop_alike_levels(*chunked);
-  if (request.occlusion) {
-    chunked->mesh.occlusion = measure_occlusion(*chunked, request.jobs, report);
-  }
   PackOptions pack_options;
   pack_options.unit_metres = request.unit_metres;
   pack_options.positions = plan->kind;
   pack_options.jobs = request.jobs;
   ShapedModel shaped;
-  MODAR_ASSIGN(shaped.stand_ins, pack_stand_ins(*chunked, {stand_ins, plan->kind}, texture_sides,
-                                                pack_options, report));
+  MODAR_ASSIGN(shaped.stand_ins, pack_stand_ins(*chunked, starts, {stand_ins, plan->kind},
+                                                texture_sides, pack_options, report));
   // Smaller models are drawn whole, and chunks that share a range are drawn in one call.
-  pack_options.prefixes = triangles_in(*chunked) > level_options.many_triangles;
+  pack_options.prefixes = triangles_in(*chunked) > kDrawnWhole;
   MODAR_ASSIGN(shaped.model, pack(*chunked, texture_sides, pack_options, report));
   tell_positions(*chunked, shaped.model, plan->kind, request, report);
   return shaped;

@@ -126,7 +126,7 @@ constexpr BakeOption kOptions[] = {
     {"--lods,--no-lods", "lods", "lods", Part::kModel, Group::kGeometry, nullptr, "4",
      "Most levels of detail, including the finest; each has half the triangles of the one before "
      "(a "
-     "quarter above a million)",
+     "quarter above 300,000)",
      NumberOption{[](BakeRequest& r) -> std::uint32_t& { return r.levels; }, 1, kMaxLevels}},
     {"--max-error", "max-error", "max_error", Part::kModel, Group::kGeometry, "LENGTH", "0.01%",
      "Largest error of stored positions: in source units, as a percentage of the diagonal (0.01%), "

@@ -271,11 +271,7 @@ class Decimator {
       const Triangle t = {indices[i], indices[i + 1], indices[i + 2]};
       if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
       const auto first_corner = static_cast<std::uint32_t>(corners_.size());
-      const glm::dvec3& origin = position(t[0]);
-      const glm::dvec3 cross = glm::cross(position(t[1]) - origin, position(t[2]) - origin);
-      const double twice = glm::length(cross);
-      Quadric plane;
-      if (twice > 0) plane = Quadric::of_plane(cross / twice, origin, 0.5 * twice);
+      const Quadric plane = Quadric::of_triangle(position(t[0]), position(t[1]), position(t[2]));
       for (std::uint32_t k = 0; k < 3; ++k) {
         corners_.push_back({all_[t[k]].first, t[(k + 1) % 3], t[(k + 2) % 3]});
         all_[t[k]].first = first_corner + k;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -21,6 +22,16 @@ constexpr double kSlideWeight = 1.0;
 /// are nearly parallel it may be anywhere. Swept on the same: 0.730, 0.732 and 0.732 with 0.75, 1.5
 /// and 3.
 constexpr double kFarthest = 1.5;
+/// Of the quadrics, where prices are summed up again: the rest is of what the mesh is now. Without
+/// memory, what is thin shrinks a little in each collapse: a scan of 0.9 million triangles is off
+/// by 0.9 % of its size at an eighth; by 0.44, 0.11 and 0.11 % at 0.3, 0.5 and 0.6. What is smooth
+/// keeps its shape better without: rms of a terrain at 1/32 is 0.783, 0.798 and 0.812 of that of
+/// meshoptimizer's simplifyWithUpdate.
+constexpr double kRemembered = 0.5;
+/// Weight of the way of a place to where its quadric is least, beside the distance from its planes:
+/// it holds places where planes are nearly parallel. Of a scan of 0.9 million triangles, rms at an
+/// eighth is 6.0, 5.7 and 5.7 thousandths of a percent with 0.01, 0.001 and 0.0001; 7.3 unmoved.
+constexpr double kPull = 0.001;
 
 std::uint32_t root_of(std::vector<std::pair<std::uint32_t, std::uint32_t>>& joined,
                       std::uint32_t id) {
@@ -43,10 +54,16 @@ MeshCollapser::MeshCollapser(CollapseMesh mesh)
       marks_(mesh_.places.size(), 0) {
   std::iota(parents_.begin(), parents_.end(), 0u);
   std::iota(left_.begin(), left_.end(), 0u);
-  for (std::size_t i = 0; i < places_.size(); ++i) places_[i].point = mesh_.places[i];
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    places_[i].point = mesh_.places[i];
+    places_[i].quadric = mesh_.quadrics[i];
+  }
   mesh_.places = {};
+  mesh_.quadrics = {};
   link_faces();
-  price_faces();
+  add_borders(1.0);
+  settle();
+  forget();
 }
 
 void MeshCollapser::link_faces() {
@@ -79,29 +96,32 @@ void MeshCollapser::remove(std::uint32_t f) {
 void MeshCollapser::forget() {
   queue_.clear();
   std::erase_if(left_, [&](std::uint32_t f) { return alive_[f] == 0; });
+  ++mark_;
+  for (const std::uint32_t f : left_) {
+    const auto& [a, b, c] = mesh_.faces[f].places;
+    Quadric plane = Quadric::of_triangle(point_of(a), point_of(b), point_of(c));
+    plane *= 1 - kRemembered;
+    for (const std::uint32_t place : {a, b, c}) {
+      Quadric& quadric = places_[place].quadric;
+      if (std::exchange(marks_[place], mark_) != mark_) quadric *= kRemembered;
+      quadric += plane;
+    }
+  }
   // Collapses make no border where there was none.
   for (const std::uint32_t f : left_) {
     for (const std::uint32_t place : mesh_.faces[f].places) {
-      places_[place].quadric = {};
       places_[place].open = places_[place].open && is_open(place);
     }
   }
-  price_faces();
+  add_borders(1 - kRemembered);
 }
 
-/// Sums up the quadrics of what is left.
-void MeshCollapser::price_faces() {
+/// Adds the planes across the borders of what is left.
+void MeshCollapser::add_borders(double weight) {
   for (const std::uint32_t f : left_) {
-    const std::array<glm::dvec3, 3> t = corners_of(mesh_.faces[f]);
-    const glm::dvec3 cross = glm::cross(t[1] - t[0], t[2] - t[0]);
-    const double twice = glm::length(cross);
     const std::array<std::uint32_t, 3>& at = mesh_.faces[f].places;
-    if (twice > 0) {
-      const Quadric plane = Quadric::of_plane(cross / twice, t[0], 0.5 * twice);
-      for (const std::uint32_t place : at) places_[place].quadric += plane;
-    }
     for (std::uint32_t k = 0; k < 3; ++k) {
-      if (places_[at[k]].open && places_[at[(k + 1) % 3]].open) add_border(f, k);
+      if (places_[at[k]].open && places_[at[(k + 1) % 3]].open) add_border(f, k, weight);
     }
   }
 }
@@ -123,7 +143,7 @@ bool MeshCollapser::is_open(std::uint32_t place) {
 }
 
 /// A plane through an edge of one triangle, across it.
-void MeshCollapser::add_border(std::uint32_t f, std::uint32_t k) {
+void MeshCollapser::add_border(std::uint32_t f, std::uint32_t k, double weight) {
   const std::array<std::uint32_t, 3>& at = mesh_.faces[f].places;
   const std::uint32_t v = at[k];
   const std::uint32_t w = at[(k + 1) % 3];
@@ -136,7 +156,7 @@ void MeshCollapser::add_border(std::uint32_t f, std::uint32_t k) {
   const double length = glm::length(across);
   if (!(length > 0)) return;
   const Quadric plane =
-      Quadric::of_plane(across / length, point_of(v), kRimWeight * glm::dot(edge, edge));
+      Quadric::of_plane(across / length, point_of(v), weight * kRimWeight * glm::dot(edge, edge));
   places_[v].quadric += plane;
   places_[w].quadric += plane;
 }
@@ -280,11 +300,12 @@ MeshCollapser::Target MeshCollapser::target_of(std::uint32_t a, std::uint32_t b)
   return best;
 }
 
-/// The triangles at two places, with the looks and shades there that become one: those that a
-/// triangle between the places has at both.
+/// The triangles at two places, or at one, with the looks and shades there that become one: those
+/// that a triangle between the places has at both.
 void MeshCollapser::collect(std::uint32_t a, std::uint32_t b) {
   near_.clear();
-  for (const std::uint32_t place : {a, b}) {
+  const std::array<std::uint32_t, 2> places = {a, b};
+  for (const std::uint32_t place : std::span(places).first(a == b ? 1 : 2)) {
     around(place, [&](std::uint32_t corner, std::uint32_t c, std::uint32_t d) {
       if (place == b && (c == a || d == a)) return;
       const std::uint32_t f = corner / 3;
@@ -486,7 +507,7 @@ void MeshCollapser::carry(const glm::dvec3& point,
   }
 }
 
-void MeshCollapser::carry_corners(const glm::dvec3& point) {
+MeshCollapser::Nearest MeshCollapser::carry_looks(const glm::dvec3& point) {
   Nearest all;
   for (const NearFace& near : near_) {
     const CollapseFace& face = mesh_.faces[near.face];
@@ -502,6 +523,11 @@ void MeshCollapser::carry_corners(const glm::dvec3& point) {
     }
     mesh_.looks[root] = sum;
   });
+  return all;
+}
+
+void MeshCollapser::carry_corners(const glm::dvec3& point) {
+  const Nearest all = carry_looks(point);
   carry(point, &CollapseFace::shades, shades_, all,
         [&](std::uint32_t root, const Nearest& nearest) {
           CornerShade sum;
@@ -515,6 +541,25 @@ void MeshCollapser::carry_corners(const glm::dvec3& point) {
           sum.normal = length > 0 ? sum.normal / length : mesh_.shades[root].normal;
           mesh_.shades[root] = sum;
         });
+}
+
+/// Moves each place to where its quadric is least, as far as no triangle turns: half-edge collapses
+/// have left it where it was. Shades stay: a blend
+/// of those around is no nearer to what level 0 has there.
+void MeshCollapser::settle() {
+  for (std::uint32_t place = 0; place < places_.size(); ++place) {
+    Place& at = places_[place];
+    if (at.first == kNoIndex) continue;
+    const glm::dvec3 point = at.quadric.least_near(at.point, kPull);
+    bool turned = false;
+    around(place, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) {
+      turned = turned || turns_too_far(point_of(a), point_of(b), at.point, point);
+    });
+    if (turned) continue;
+    collect(place, place);
+    carry_looks(point);
+    at.point = point;
+  }
 }
 
 }  // namespace modar

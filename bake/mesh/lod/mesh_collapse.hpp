@@ -40,9 +40,11 @@ struct CollapseFace {
   std::uint32_t material = 0;
 };
 
-/// A mesh as collapses see it. A look, and a shade, belongs to one place.
+/// A mesh as collapses see it. A look, and a shade, belongs to one place. Faces may have no area,
+/// and two of their corners at one place: those are gone.
 struct CollapseMesh {
   std::vector<glm::dvec3> places;
+  std::vector<Quadric> quadrics;  ///< of each place: of the surface that it stands for
   std::vector<CornerLook> looks;
   std::vector<CornerShade> shades;
   std::vector<CollapseFace> faces;
@@ -116,7 +118,7 @@ class MeshCollapser {
   /// Collapses until at most so many triangles are left. False: there is no way to so few.
   bool reduce_to(std::size_t triangles);
 
-  /// Prices by what the mesh is now, no longer by what it was at first: keeps the shape of coarse
+  /// Prices by what the mesh is now and less by what it was before: keeps the shape of coarse
   /// levels better, and costs a look at all that is left.
   void forget();
 
@@ -184,9 +186,10 @@ class MeshCollapser {
   void link_faces();
   [[nodiscard]] std::array<glm::dvec3, 3> corners_of(const CollapseFace& face) const;
   void remove(std::uint32_t f);
-  void price_faces();
+  void add_borders(double weight);
+  void settle();
   bool is_open(std::uint32_t place);
-  void add_border(std::uint32_t f, std::uint32_t k);
+  void add_border(std::uint32_t f, std::uint32_t k, double weight);
   void fill_queue(std::size_t collapses);
   [[nodiscard]] Candidate candidate(std::uint32_t a, std::uint32_t b);
   void push_around(std::uint32_t place);
@@ -201,8 +204,9 @@ class MeshCollapser {
   void collapse(std::uint32_t to, std::uint32_t from, const glm::dvec3& point);
   void collect(std::uint32_t a, std::uint32_t b);
   void join(std::array<std::uint32_t, 3> CollapseFace::*member, Joined& joined);
-  void carry_corners(const glm::dvec3& point);
   struct Nearest;
+  Nearest carry_looks(const glm::dvec3& point);
+  void carry_corners(const glm::dvec3& point);
   template <class Callback>
   void carry(const glm::dvec3& point, std::array<std::uint32_t, 3> CollapseFace::*member,
              Joined& joined, const Nearest& all, const Callback& callback);

@@ -50,7 +50,7 @@ constexpr double kMaxSlide = 0.01;
 constexpr float kSteepest = 8;
 /// A price (see CollapseSequence) below what half floats tell apart.
 constexpr float kLeastPrice = static_cast<float>(kDistanceFloor * kDistanceFloor);
-/// Of its share of the coarsest level, the triangles at which a chunk's decimation ends: the
+/// Of its share of the last cut, the triangles at which a chunk's decimation ends: the
 /// model's are shared out by need, and a flat chunk may lose more. Of five scans and a terrain, the
 /// bundles of all but one are the same as at a half, levels of the dragon take 0.9 of the time
 /// (`modar bake`).
@@ -264,7 +264,7 @@ std::vector<glm::dvec3> decoded_positions(const TriMesh& mesh, const Chunk& chun
 
 CollapseSequence decimate(const TriMesh& mesh, const Chunk& chunk, const MergedVertices& merged,
                           const ChunkGrid& grid, const SharedVertices& shared, PositionKind kind,
-                          std::span<const std::uint32_t> sides, std::uint32_t halvings) {
+                          std::span<const std::uint32_t> sides, double share) {
   const std::size_t triangles = chunk.indices.size() / 3;
   if (triangles < 2 * kFewTriangles) return {};
   const std::vector<glm::dvec3> positions = decoded_positions(mesh, chunk, kind, grid);
@@ -272,7 +272,7 @@ CollapseSequence decimate(const TriMesh& mesh, const Chunk& chunk, const MergedV
   limits.max_error = kMaxCollapse * diagonal_of(positions);
   limits.least_triangles =
       std::max(kFewTriangles,
-               static_cast<std::size_t>(kLeastShare * static_cast<double>(triangles >> halvings)));
+               static_cast<std::size_t>(kLeastShare * share * static_cast<double>(triangles)));
   const std::vector<glm::dvec2> texels = texels_of(mesh, chunk, positions, sides, limits);
   return decimate_chunk({positions, texels, shared.twins}, merged.indices_of(chunk), shared.locked,
                         limits);
@@ -595,10 +595,10 @@ class ChunkLooker {
 
 /// Fills one chunk's coarser levels: what it is after the collapses ahead of each cut. hidden: the
 /// share of what shading shows below which distances are not told apart.
-void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkGrid& grid,
-                 const LevelOptions& options, const CollapseSequence& sequence,
-                 const std::vector<Cut>& cuts, double hidden, Chunk& chunk) {
-  const std::vector<glm::dvec3> positions = decoded_positions(mesh, chunk, options.positions, grid);
+void level_chunk(const TriMesh& mesh, const MergedVertices& merged,
+                 std::span<const glm::dvec3> positions, const LevelOptions& options,
+                 const CollapseSequence& sequence, const std::vector<Cut>& cuts, double hidden,
+                 Chunk& chunk) {
   DecimateLimits limits;
   const std::vector<glm::dvec2> texels =
       texels_of(mesh, chunk, positions, options.texture_sides, limits);
@@ -631,6 +631,34 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged, const ChunkG
   }
 }
 
+/// What the collapses ahead of a cut have left of a chunk that has its levels.
+StandInStart start_of(const TriMesh& mesh, const Chunk& chunk, const MergedVertices& merged,
+                      std::span<const glm::dvec3> positions, const CollapseSequence& sequence,
+                      const Cut& cut) {
+  StandInStart start;
+  const std::vector<std::uint16_t> become =
+      collapsed_vertices(sequence, collapses_at(sequence, cut), positions.size());
+  const auto of = [&](std::uint16_t v) {
+    return become[merged.first.empty() ? v : merged.first[v]];
+  };
+  start.indices = chunk.coarser.empty() ? chunk.indices : chunk.coarser.back().indices;
+  for (std::uint16_t& v : start.indices) v = of(v);
+  split_normals(mesh, chunk, merged, positions, start.indices);
+  std::vector<std::uint16_t> numbers(positions.size());
+  for (std::uint32_t v = 0; v < positions.size(); ++v) {
+    if (of(static_cast<std::uint16_t>(v)) != v) continue;
+    numbers[v] = static_cast<std::uint16_t>(start.vertices.size());
+    start.vertices.push_back(static_cast<std::uint16_t>(v));
+  }
+  start.quadrics.resize(start.vertices.size());
+  for (std::size_t i = 0; i < chunk.indices.size(); i += 3) {
+    const std::uint16_t* t = &chunk.indices[i];
+    const Quadric plane = Quadric::of_triangle(positions[t[0]], positions[t[1]], positions[t[2]]);
+    for (std::size_t k = 0; k < 3; ++k) start.quadrics[numbers[of(t[k])]] += plane;
+  }
+  return start;
+}
+
 }  // namespace
 
 Result<void> LevelOptions::validate() const {
@@ -655,9 +683,10 @@ std::vector<std::uint32_t> halvings_of(std::size_t triangles, const LevelOptions
   return halvings;
 }
 
-Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report& report) {
+Result<std::vector<StandInStart>> make_levels(ChunkedMesh& mesh, const LevelOptions& options,
+                                              Report& report) {
   MODAR_TRY(options.validate());
-  if (options.levels == 1) return {};
+  if (options.levels == 1) return std::vector<StandInStart>();
   StageTimer timer(report, "levels");
   std::vector<MergedVertices> merged;
   for (const Chunk& chunk : mesh.chunks) merged.push_back(merge_vertices(mesh.mesh, chunk));
@@ -673,17 +702,27 @@ Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report&
       if (report.progress) report.progress("levels", begin + 0.5 * done);
     }
   };
-  const std::vector<std::uint32_t> halvings = halvings_of(triangles_in(mesh), options);
+  const std::size_t all = triangles_in(mesh);
+  const std::vector<std::uint32_t> halvings = halvings_of(all, options);
+  const std::size_t last = options.start > 0 ? options.start : all >> halvings.back();
   std::vector<CollapseSequence> sequences(chunks);
   each_chunk(0.0, [&](std::size_t c) {
-    sequences[c] = decimate(mesh.mesh, mesh.chunks[c], merged[c], grids[c], shared[c],
-                            options.positions, options.texture_sides, halvings.back());
+    sequences[c] =
+        decimate(mesh.mesh, mesh.chunks[c], merged[c], grids[c], shared[c], options.positions,
+                 options.texture_sides, static_cast<double>(last) / static_cast<double>(all));
   });
   const std::vector<Cut> cuts = cuts_for(mesh, sequences, halvings);
-  const double hidden = triangles_in(mesh) > options.measured_triangles ? kHidden : 0.0;
+  const double hidden = all > options.measured_triangles ? kHidden : 0.0;
+  std::vector<StandInStart> starts(options.start > 0 ? chunks : 0);
+  const Cut start = cut_for(mesh, sequences, options.start).value_or(cuts.back());
   each_chunk(0.5, [&](std::size_t c) {
-    level_chunk(mesh.mesh, merged[c], grids[c], options, sequences[c], cuts, hidden,
-                mesh.chunks[c]);
+    Chunk& chunk = mesh.chunks[c];
+    const std::vector<glm::dvec3> positions =
+        decoded_positions(mesh.mesh, chunk, options.positions, grids[c]);
+    level_chunk(mesh.mesh, merged[c], positions, options, sequences[c], cuts, hidden, chunk);
+    if (!starts.empty()) {
+      starts[c] = start_of(mesh.mesh, chunk, merged[c], positions, sequences[c], start);
+    }
     sequences[c] = {};
   });
   std::uint64_t fine = 0;
@@ -701,7 +740,7 @@ Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report&
   figures.position_error_max = error * mesh.mesh.placement.scale;
   timer.done(fine, triangles, figures.position_error_max);
   report.levels.push_back(figures);
-  return {};
+  return starts;
 }
 
 void drop_alike_levels(ChunkedMesh& mesh) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "bake/mesh/lod/quadric.hpp"
 #include "bake/mesh/pack/chunk.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 
@@ -17,21 +18,32 @@ struct LevelOptions {
   std::uint32_t levels = 4;  ///< greatest number a chunk, the finest counted; 1 to kMaxLevels
   PositionKind positions = PositionKind::kHalf;  ///< whose decoded positions the errors are of
   unsigned jobs = 1;                             ///< threads; the result does not depend on it
-  /// A level of more triangles than this is a quarter of the level before it, not a half: no phone
-  /// draws a million, and each level takes bytes and has to be measured.
-  std::size_t many_triangles = 1'000'000;
+  /// A level of more triangles than this is a quarter of the level before it, not a half: up to a
+  /// million a phone draws the finest, and each level takes bytes and has to be measured. Without
+  /// its half, a scan of 0.9 million triangles is baked in 0.92 of the time.
+  std::size_t many_triangles = 300'000;
   /// The distances of levels of larger models are told by the ways of their vertices, where the
   /// shading shows far more: the bound holds, but is loose. Measuring those of a scan of 0.9
   /// million triangles takes a quarter of its bake.
   std::size_t measured_triangles = kMeasuredTriangles;
   /// Coarser levels are none of the chunks' (see plan_stand_ins()).
   std::uint32_t most_halvings = 0xFFFFFFFFu;
+  std::size_t start = 0;  ///< as StandInPlan's; 0: none is asked for
   /// Pixels of each material's texture along a side, 0 where it has none; may be empty.
   std::vector<std::uint32_t> texture_sides;
   [[nodiscard]] Result<void> validate() const;
 };
 
 inline constexpr std::uint32_t kMaxLevels = 12;
+
+/// What is left of a chunk where stand-ins begin: after more collapses than its coarsest level has,
+/// with which borders of chunks stay where they are, and which are cheaper than those of a whole
+/// mesh.
+struct StandInStart {
+  std::vector<std::uint16_t> indices;   ///< what each corner of that level has become
+  std::vector<std::uint16_t> vertices;  ///< that are left, of those that differ in normals one
+  std::vector<Quadric> quadrics;  ///< of each of these: of the triangles of level 0 it stands for
+};
 
 /// Triangles of level 0.
 std::size_t triangles_in(const ChunkedMesh& mesh);
@@ -52,8 +64,10 @@ std::vector<std::uint32_t> halvings_of(std::size_t triangles, const LevelOptions
 /// of a finer one that is hardly off, or told by the ways of vertices (see measured_triangles);
 /// beside it stands what its normals, its colours and its texture show (see PixelCells), which is
 /// far more. Where vertices of level 0 are gone, the texture has slid by no more than 1 % of the
-/// chunk's diagonal. Figures go to report.levels.
-Result<void> make_levels(ChunkedMesh& mesh, const LevelOptions& options, Report& report);
+/// chunk's diagonal. Figures go to report.levels. Answers where stand-ins begin in each chunk, if
+/// the options have a start.
+Result<std::vector<StandInStart>> make_levels(ChunkedMesh& mesh, const LevelOptions& options,
+                                              Report& report);
 
 /// Takes out the levels that are hardly nearer to the finest than the next coarser one is.
 void drop_alike_levels(ChunkedMesh& mesh);
@@ -69,6 +83,7 @@ struct StandIn {
 /// have all levels, else those before.
 struct StandInPlan {
   std::vector<std::uint32_t> halvings;
+  std::size_t start = 0;  ///< triangles of all chunks from which the first is made
 };
 
 /// Small meshes need none. Those of one chunk have borders that nothing else meets, so that only
@@ -83,11 +98,12 @@ struct StandInOptions {
   std::size_t measured_triangles = kMeasuredTriangles;  ///< as LevelOptions'
 };
 
-/// Makes the stand-ins of a mesh whose chunks have their levels, the finest first. Borders of
-/// chunks mean nothing to them, those of materials and uv islands are kept as long as anything else
-/// costs less. Fewer than planned where a mesh is in too many pieces. Vertices carry the normals,
-/// uvs, colours and occlusion of level 0.
-Result<std::vector<StandIn>> make_stand_ins(const ChunkedMesh& mesh, const StandInOptions& options,
-                                            Report& report);
+/// Makes the stand-ins of a mesh whose chunks have their levels, the finest first, from where they
+/// begin in each chunk. Borders of chunks mean nothing to them, those of materials and uv islands
+/// are kept as long as anything else costs less. Fewer than planned where a mesh is in too many
+/// pieces. Vertices carry the normals, uvs, colours and occlusion of level 0.
+Result<std::vector<StandIn>> make_stand_ins(const ChunkedMesh& mesh,
+                                            const std::vector<StandInStart>& starts,
+                                            const StandInOptions& options, Report& report);
 
 }  // namespace modar

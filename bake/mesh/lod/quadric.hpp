@@ -41,6 +41,12 @@ struct Quadric {
   double c = 0;
   double area = 0;
 
+  /// Of a triangle by its area; zero where it has none.
+  static Quadric of_triangle(const glm::dvec3& p, const glm::dvec3& q, const glm::dvec3& r) {
+    const glm::dvec3 cross = glm::cross(q - p, r - p);
+    const double twice = glm::length(cross);
+    return twice > 0 ? of_plane(cross / twice, p, 0.5 * twice) : Quadric();
+  }
   /// normal: of unit length.
   static Quadric of_plane(const glm::dvec3& normal, const glm::dvec3& point, double area) {
     const glm::dvec3 n = normal * area;
@@ -55,9 +61,32 @@ struct Quadric {
     c += q.c;
     area += q.area;
   }
+  void operator*=(double factor) {
+    for (double* of : {&xx, &yy, &zz, &xy, &xz, &yz, &c, &area}) *of *= factor;
+    b *= factor;
+  }
   [[nodiscard]] double at(const glm::dvec3& p) const {
     return p.x * (xx * p.x + 2 * (xy * p.y + xz * p.z + b.x)) +
            p.y * (yy * p.y + 2 * (yz * p.z + b.y)) + p.z * (zz * p.z + 2 * b.z) + c;
+  }
+  /// The point where it and the square of the way there, weighted by some of its area, is least.
+  [[nodiscard]] glm::dvec3 least_near(const glm::dvec3& p, double pull) const {
+    const double more = pull * area;
+    const double x = xx + more, y = yy + more, z = zz + more;
+    const glm::dvec3 slope(xx * p.x + xy * p.y + xz * p.z + b.x,
+                           xy * p.x + yy * p.y + yz * p.z + b.y,
+                           xz * p.x + yz * p.y + zz * p.z + b.z);
+    const double m00 = y * z - yz * yz;
+    const double m01 = xz * yz - xy * z;
+    const double m02 = xy * yz - xz * y;
+    const double m11 = x * z - xz * xz;
+    const double m12 = xy * xz - x * yz;
+    const double m22 = x * y - xy * xy;
+    const double determinant = x * m00 + xy * m01 + xz * m02;
+    return p - glm::dvec3(m00 * slope.x + m01 * slope.y + m02 * slope.z,
+                          m01 * slope.x + m11 * slope.y + m12 * slope.z,
+                          m02 * slope.x + m12 * slope.y + m22 * slope.z) /
+                   determinant;
   }
   /// The point where it is least; false where the planes are so nearly parallel to a line that
   /// rounding decides.
