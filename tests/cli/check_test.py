@@ -2,6 +2,7 @@
 import json
 import os
 import pathlib
+import random
 import shutil
 import subprocess
 import tarfile
@@ -197,6 +198,23 @@ class Check(ProgramTest):
             self.assertLessEqual(level["side_px"], finer["side_px"])
             self.assertLess(level["difference_p99"], 2)
         self.assertLess(levels[-1]["triangles"], levels[0]["triangles"])
+
+    def test_rough_models_are_looked_at_in_many_samples(self):
+        # Where every sample falls on another triangle, pictures of 16 samples a pixel differ by 2.75 of 255.
+        side, rough = 60, random.Random(1)
+        with open(self.folder / "rough.obj", "w") as file:
+            for i in range(side * side):
+                file.write(f"v {i % side} {i // side} {0.4 * rough.random():.4f}\n")
+            for i in range(1, side * (side - 1)):
+                if i % side:
+                    file.write(f"f {i} {i + 1} {i + side + 1} {i + side}\n")
+        path = self.folder / "rough.modar"
+        done = self.modar("bake", "--model", "rough.obj", "-o", path, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        looks = json.loads(self.check(0, path, "--json", "--source", "rough.obj", "--visual", self.folder / "rough-looks"))
+        levels = looks["looks"][0]["levels"]
+        self.assertGreater(levels[0]["side_px"], 5)
+        self.assertLess(max(level["difference_p99"] for level in levels), 2)
 
     @unittest.skipUnless(os.environ.get("MODAR_SOAK", "0") != "0", "seconds under ASan: with --all")
     def test_patterns_are_tracked_in_rendered_views(self):

@@ -303,6 +303,43 @@ std::map<std::uint32_t, std::size_t> triangles_of_levels(const ChunkedMesh& mesh
   return counts;
 }
 
+/// Side of the smallest pixel of the first level of a sheet, after a change of its vertices: all
+/// normals are those of a plane before.
+template <class Change>
+double shading_of_sheet(const Change& change) {
+  ChunkedMesh sheet = chunked(welded(parse(grid(60, 1))), 65535);
+  for (glm::vec3& normal : sheet.mesh.normals) normal = {0, 0, 1};
+  sheet.mesh.occlusion = Array<std::uint8_t>(sheet.mesh.positions.size(), 127);
+  std::mt19937 random(3);
+  for (std::size_t v = 0; v < sheet.mesh.positions.size(); ++v)
+    change(sheet.mesh, v, static_cast<std::uint32_t>(random()));
+  Report report;
+  EXPECT_TRUE(make_levels(sheet, {}, report));
+  EXPECT_EQ(sheet.chunks.size(), 1u);
+  return sheet.chunks[0].coarser.at(0).shading;
+}
+
+/// Half of the vertices are gone in the first level: of some, the picture shows it.
+TEST(Levels, AreDrawnByWhatVerticesThatAreGoneShowed) {
+  const auto tilted_below = [](double share) {
+    return [share](TriMesh& mesh, std::size_t v, std::uint32_t random) {
+      const bool in =
+          v < static_cast<std::size_t>(share * static_cast<double>(mesh.normals.size()));
+      const double tilt = 0.6 * static_cast<double>(random) / 4294967296.0 - 0.3;
+      if (in) mesh.normals[v] = glm::normalize(glm::vec3(static_cast<float>(tilt), 0, 1));
+    };
+  };
+  EXPECT_EQ(shading_of_sheet(tilted_below(0)), 0.0);
+  EXPECT_EQ(shading_of_sheet(tilted_below(0.005)), 0.0);  // nobody sees one pixel in a hundred
+  EXPECT_GT(shading_of_sheet(tilted_below(0.1)), 0.02);
+  // The sides of a triangle are a sixtieth of the sheet's, which are 2 long.
+  EXPECT_LT(shading_of_sheet(tilted_below(1)), 2.0);
+  const auto darken = [](TriMesh& mesh, std::size_t v, std::uint32_t random) {
+    mesh.occlusion[v] = static_cast<std::uint8_t>(random % 128);
+  };
+  EXPECT_GT(shading_of_sheet(darken), 0.1);
+}
+
 TEST(Levels, CountsAreThoseAsked) {
   const TriMesh mesh = welded(parse(ball(40)));
   const std::size_t all = mesh.triangles.size();

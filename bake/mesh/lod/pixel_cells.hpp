@@ -16,7 +16,7 @@ namespace modar {
 /// What a mesh shows at a point.
 struct Look {
   glm::dvec3 normal{0.0};  ///< as it is blended, not of unit length
-  glm::dvec3 colour{0.0};  ///< of 255, as stored
+  glm::dvec3 colour{0.0};  ///< of 255, as stored, and by how much occlusion changes the picture
   glm::dvec2 uv{0.0};
 };
 
