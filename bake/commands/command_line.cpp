@@ -185,6 +185,12 @@ class HelpFormatter : public CLI::Formatter {
   std::shared_ptr<std::set<const void*>> in_full_;
 };
 
+/// "modar ship publish".
+std::string full_name(const CLI::App& app) {
+  const CLI::App* parent = app.get_parent();
+  return (parent != nullptr ? full_name(*parent) + " " : "") + app.get_name();
+}
+
 /// The first word of the command line that nothing takes, and the name that it is nearest to.
 std::optional<Error> unknown_word(const CLI::App* app) {
   while (!app->get_subcommands().empty()) app = app->get_subcommands().front();
@@ -204,7 +210,7 @@ std::optional<Error> unknown_word(const CLI::App* app) {
     if (names.empty()) return std::nullopt;
   }
   const std::string_view meant = nearest_name(word, names);
-  const std::string cure = meant.empty() ? "see `" + app->get_display_name() + " --help`"
+  const std::string cure = meant.empty() ? "see `" + full_name(*app) + " --help`"
                                          : "did you mean " + std::string(meant) + "?";
   return Error{ExitCode::kUsage, "cli.unknown", word,
                is_option ? "there is no such option" : "there is no such command", cure};
@@ -439,10 +445,7 @@ void CommandLine::run(std::function<Result<ExitCode>()> work) {
 
 CommandText CommandLine::describe() const {
   const CLI::App& app = *parts_->app;
-  CommandText text{app.get_display_name(), app.get_description(), app.get_footer(), {}, {}};
-  for (const CLI::App* up = app.get_parent(); up != nullptr; up = up->get_parent()) {
-    text.name = up->get_name() + " " + text.name;
-  }
+  CommandText text{full_name(app), app.get_description(), app.get_footer(), {}, {}};
   for (const CLI::Option* option : app.get_options()) {
     const auto known = parts_->choices.find(option);
     OptionText one{
@@ -476,13 +479,10 @@ Error CommandLine::explained(const std::exception& error) const {
   const CLI::Option* option = option_in(*parts.app, error.what());
   const auto choices = parts.choices.find(option);
   const auto rules = parts.rules.find(option);
-  std::string help = parts.app->get_name();
-  for (const CLI::App* up = parts.app->get_parent(); up != nullptr; up = up->get_parent()) {
-    help = up->get_name() + " " + help;
-  }
   return usage_error(dynamic_cast<const CLI::ParseError&>(error), option,
                      choices == parts.choices.end() ? std::vector<std::string>() : choices->second,
-                     rules == parts.rules.end() ? OptionRules() : rules->second, help);
+                     rules == parts.rules.end() ? OptionRules() : rules->second,
+                     full_name(*parts.app));
 }
 
 int CommandLine::parse_and_run(int argc, char** argv) {

@@ -234,6 +234,7 @@ class Words(ProgramTest):
         done = self.modar("zzzzzzzz")
         self.assert_fails(done, 1, "zzzzzzzz", "--help")
         self.assertNotIn("did you mean", done.stderr)
+        self.assert_fails(self.modar("ship", "publish", "--zzzzzzzz"), 1, "--zzzzzzzz", "see `modar ship publish --help`")
 
     def test_help_says_ranges_and_exclusions_in_words(self):
         for words in (["bake"], ["check"], ["pattern", "rectify"], ["ship", "publish"]):
