@@ -24,7 +24,7 @@ void add_key_options(CommandLine& line, std::string& key, std::string& pass_phra
 void add_keygen(CommandLine& ship) {
   CommandLine& line = ship.command("keygen", "Make a new pair of keys, in minisign's format");
   const auto keygen = std::make_shared<KeygenCommand>();
-  line.option("--out", &keygen->out, "Secret key to write; the public key goes to K.pub",
+  line.option("-o,--out", &keygen->out, "Secret key to write; the public key goes to K.pub",
               {.type = "K", .required = true});
   line.option("--pass-phrase-file", &keygen->pass_phrase_file,
               "Encrypt the secret key with the file's first line", {.type = "FILE"});
@@ -134,7 +134,7 @@ void add_trust(CommandLine& ship) {
   line.option("keys", &trust->keys, "Public keys", {.type = "K.pub...", .required = true});
   line.option("--threshold", &trust->threshold, "How many of them must agree",
               {.required = true, .least = 1, .most = 16});
-  line.option("--out", &trust->out,
+  line.option("-o,--out", &trust->out,
               "File to write, for `modar-fetch --trust` and wherever K.pub is accepted",
               {.type = "FILE", .required = true});
   line.footer(ship_example(

@@ -496,7 +496,7 @@ class Cache(ProjectTest):
     def test_a_key_keeps_planted_entries_out(self):
         cache, plant, key, other = (self.folder / name for name in ("cache", "plant", "key", "other"))
         for name in (key, other):
-            self.modar("ship", "keygen", "--out", name)
+            self.modar("ship", "keygen", "-o", name)
         self.bake("--cache", cache)
         self.good = (self.place / "out/museum.modar").read_bytes()
         # Who has no key writes entries that are sound but for the signature.
