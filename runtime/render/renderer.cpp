@@ -269,7 +269,9 @@ struct Renderer::State {
       stats.lod_error = list.greatest_error(bundle);
       return;
     }
+    float listed = 0.0f;
     const auto lacks = [&](float some) {
+      listed = some;
       list.build(bundle, painter.setups(), projection, height, items, some);
       list.sort_by_distance();
       list_levels();
@@ -287,7 +289,7 @@ struct Renderer::State {
       const float middle = std::sqrt(coarse * fine);
       (lacks(middle) ? fine : coarse) = middle;
     }
-    lacks(fine);
+    if (listed != fine) lacks(fine);
     geometry.want(levels);
     list.build_of(geometry, bundle, painter.setups(), projection, height, items, pixels);
     stats.lod_error = list.greatest_error(bundle);

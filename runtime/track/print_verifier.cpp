@@ -257,7 +257,7 @@ bool PrintVerifier::scattered(const Evidence& seen) {
     if (cell.state != CellState::kAgrees) continue;
     ++agreeing;
     likeness += 0.01 * cell.likeness;
-    --neighbours;  // it is none of its own
+    --neighbours;  // the loop below counts the cell itself
     --even;
     for (int y = std::max(0, at / kCellSide - 1); y <= std::min(kCellSide - 1, at / kCellSide + 1);
          ++y) {

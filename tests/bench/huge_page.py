@@ -4,7 +4,7 @@
     huge_page.py BUNDLE [--max-bytes 64000000] [--line 10e6] [--latency 100] [--seconds 60] [--hold 20] [--nearest 0.02] [--page FOLDER] [--keep FOLDER]
 
 Makes the page of `modar web`, serves it by ranges, and flies: from far down to the surface, along it, and up again; after each third it
-holds still. Prints JSON: frames and the longest one (milliseconds, with the drawing, which is SwiftShader's on a CPU), the longest task of
+holds still. Prints JSON: frames and the longest one of the flight (milliseconds, with the drawing, which is SwiftShader's on a CPU), the longest task of
 the page's own, bytes that came, the greatest number of bytes on the GPU, resident memory of all of the browser's processes beside a blank
 page's, at the end of each hold the triangles and the error of what was drawn (pixels; it counts shading, the form differs by less), and
 `pops`: each time that the picture changed while the eye held still, how far what is seen moved, pixels (median, 95 and 99 % of squares of
@@ -77,12 +77,14 @@ FLY = """(async () => {
   const during = async (seconds, step) => {
     const start = performance.now();
     for (let before = start, now; (now = await new Promise(requestAnimationFrame)) - start < 1000 * seconds; before = now) {
-      flown.longest = Math.max(flown.longest, now - before);
-      step((now - start) / 1000 / seconds);
+      step((now - start) / 1000 / seconds, now - before);
     }
   };
   for (const third of [0, 1, 2]) {
-    await during(%(seconds)g / 3, (part) => draw((third + part) / 3));
+    await during(%(seconds)g / 3, (part, took) => {
+      flown.longest = Math.max(flown.longest, took);
+      draw((third + part) / 3);
+    });
     const held = [];
     let shown = '';
     await during(%(hold)g, () => {

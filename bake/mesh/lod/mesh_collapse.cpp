@@ -543,9 +543,9 @@ void MeshCollapser::carry_corners(const glm::dvec3& point) {
         });
 }
 
-/// Moves each place to where its quadric is least, as far as no triangle turns: half-edge collapses
-/// have left it where it was. Shades stay: a blend
-/// of those around is no nearer to what level 0 has there.
+/// Moves each place to where its quadric is least, if no triangle turns: half-edge collapses have
+/// left it where it was. Shades stay: a blend of those around is no nearer to what level 0 has
+/// there.
 void MeshCollapser::settle() {
   for (std::uint32_t place = 0; place < places_.size(); ++place) {
     Place& at = places_[place];
