@@ -349,7 +349,6 @@ Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& 
   level_options.start = stand_ins.start;
   MODAR_ASSIGN(const std::vector<StandInStart> starts,
                make_levels(*chunked, level_options, report));
-  drop_alike_levels(*chunked);
   PackOptions pack_options;
   pack_options.unit_metres = request.unit_metres;
   pack_options.positions = plan->kind;
@@ -357,6 +356,9 @@ Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& 
   ShapedModel shaped;
   MODAR_ASSIGN(shaped.stand_ins, pack_stand_ins(*chunked, starts, {stand_ins, plan->kind},
                                                 texture_sides, pack_options, report));
+  const bool one_chunk = chunked->chunks.size() == 1 && !shaped.stand_ins.empty();
+  drop_alike_levels(*chunked, one_chunk ? shaped.stand_ins[0].levels[0].error
+                                        : std::numeric_limits<double>::infinity());
   // Smaller models are drawn whole, and chunks that share a range are drawn in one call.
   pack_options.prefixes = triangles_in(*chunked) > kDrawnWhole;
   MODAR_ASSIGN(shaped.model, pack(*chunked, texture_sides, pack_options, report));

@@ -240,26 +240,21 @@ TEST(StandIns, LoseTheSmallestPiecesAndCountThem) {
   }
 }
 
-TEST(StandIns, AreOneOfOneChunkAndNoneOfFewTriangles) {
+TEST(StandIns, ArePlannedByTrianglesAndLevels) {
   LevelOptions options;
   options.levels = kMaxLevels;
-  const auto planned = [&](int n, std::uint32_t vertices) {
-    return plan_stand_ins(chunked(welded(parse(grid(n, 1))), vertices), options).halvings;
+  const auto planned = [&](int n) {
+    return plan_stand_ins(chunked(welded(parse(grid(n, 1))), 1500), options).halvings;
   };
   using Halvings = std::vector<std::uint32_t>;
-  EXPECT_EQ(planned(100, 65535), Halvings{4});
-  EXPECT_EQ(planned(170, 65535), Halvings{5});
-  EXPECT_EQ(planned(60, 65535), Halvings());  // an eighth of 7200 are 900
-  EXPECT_EQ(planned(60, 1500), Halvings());
-  EXPECT_EQ(planned(100, 1500), (Halvings{3, 4}));
+  EXPECT_EQ(planned(60), Halvings());  // an eighth of 7200 are 900
+  EXPECT_EQ(planned(100), (Halvings{3, 4}));
   // A quarter of 10,000, and the least of 80,000 halved that is above 1000.
-  EXPECT_EQ(planned(200, 1500), (Halvings{3, 5, 6}));
+  EXPECT_EQ(planned(200), (Halvings{3, 5, 6}));
   options.levels = 4;
-  EXPECT_EQ(planned(100, 1500), Halvings{3});
-  EXPECT_EQ(planned(170, 65535), Halvings{3});
+  EXPECT_EQ(planned(100), Halvings{3});
   options.levels = 3;
-  EXPECT_EQ(planned(100, 1500), Halvings());
-  EXPECT_EQ(planned(170, 65535), Halvings());
+  EXPECT_EQ(planned(100), Halvings());
 }
 
 }  // namespace

@@ -743,13 +743,17 @@ Result<std::vector<StandInStart>> make_levels(ChunkedMesh& mesh, const LevelOpti
   return starts;
 }
 
-void drop_alike_levels(ChunkedMesh& mesh) {
+void drop_alike_levels(ChunkedMesh& mesh, double stand_in) {
   const auto shown = [](const ChunkLevel& level) { return std::max(level.error, level.shading); };
   for (Chunk& chunk : mesh.chunks) {
     std::vector<ChunkLevel>& levels = chunk.coarser;
-    for (std::size_t i = levels.size(); i-- > 1;) {
-      if (shown(levels[i - 1]) <= kAlike * shown(levels[i])) continue;
-      levels.erase(levels.begin() + static_cast<std::ptrdiff_t>(i) - 1);
+    double next = stand_in;
+    for (std::size_t i = levels.size(); i-- > 0;) {
+      if (shown(levels[i]) > kAlike * next) {
+        levels.erase(levels.begin() + static_cast<std::ptrdiff_t>(i));
+      } else {
+        next = shown(levels[i]);
+      }
     }
   }
 }

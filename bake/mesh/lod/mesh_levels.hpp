@@ -70,7 +70,9 @@ Result<std::vector<StandInStart>> make_levels(ChunkedMesh& mesh, const LevelOpti
                                               Report& report);
 
 /// Takes out the levels that are hardly nearer to the finest than the next coarser one is.
-void drop_alike_levels(ChunkedMesh& mesh);
+/// stand_in: the error that the renderer goes by of the one that comes after all of a chunk's
+/// levels; infinite where there is none, or chunks are drawn where it is not.
+void drop_alike_levels(ChunkedMesh& mesh, double stand_in);
 
 /// A whole mesh as one coarse level, with vertices and chunks of its own.
 struct StandIn {
@@ -86,10 +88,9 @@ struct StandInPlan {
   std::size_t start = 0;  ///< triangles of all chunks from which the first is made
 };
 
-/// Small meshes need none. Those of one chunk have borders that nothing else meets, so that only
-/// the coarsest level is one: all that a first sight brings of the model (see LoadStage::kShow; of
-/// a scan of 70,000 triangles 12 KB instead of 546). options: of the chunks' levels, with which
-/// stand-ins are counted.
+/// Small meshes need none. The coarsest is all that a first sight brings of the model (see
+/// LoadStage::kShow; of a scan of 70,000 triangles 12 KB instead of 546). options: of the chunks'
+/// levels, with which stand-ins are counted.
 StandInPlan plan_stand_ins(const ChunkedMesh& mesh, const LevelOptions& options);
 
 struct StandInOptions {

@@ -536,8 +536,6 @@ StandInPlan plan_stand_ins(const ChunkedMesh& mesh, const LevelOptions& options)
   if (triangles >> first < kLeastStandIn) return plan;
   std::uint32_t last = first;
   while (triangles >> (last + 1) >= kLeastStandIn) ++last;
-  // A single chunk's borders meet nothing, and its levels cost no vertices: only the coarsest.
-  if (mesh.chunks.size() < 2) first = last = std::max(first, std::min(last, options.levels - 1));
   LevelOptions before = options;
   before.most_halvings = first - 1;
   const std::size_t levels = 1 + halvings_of(triangles, before).size();
