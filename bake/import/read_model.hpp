@@ -18,6 +18,10 @@ Result<SourceModel> read_model(const std::string& path, unsigned jobs);
 /// Is it a file that read_model() has a reader for, by its extension?
 bool is_model_file(const std::string& path);
 
+/// Is a picture's stem that of a model and a word for its colours, as "pawn_albedo" of "pawn"? Such
+/// a picture is the texture of a model that names no material file.
+bool is_texture_name(std::string_view picture, std::string_view model);
+
 /// The same as an error. Errors: kUnsupported
 /// "model.format", whose cure converts what it is.
 Result<void> require_model_format(const std::string& path);

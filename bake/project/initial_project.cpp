@@ -79,9 +79,14 @@ Result<Found> look_through(const std::string& folder) {
   std::sort(found.models.begin(), found.models.end());
   std::sort(found.pictures.begin(), found.pictures.end());
   std::sort(found.left_out.begin(), found.left_out.end());
-  // What a material names is a texture.
+  // What a material names is a texture, and what is named as one of a model beside it.
   std::erase_if(found.pictures, [&](const fs::path& picture) {
-    return found.material_text.find(lower(picture.filename().string())) != std::string::npos;
+    const auto is_of = [&](const fs::path& model) {
+      return model.parent_path() == picture.parent_path() &&
+             is_texture_name(picture.stem().string(), model.stem().string());
+    };
+    return found.material_text.find(lower(picture.filename().string())) != std::string::npos ||
+           std::any_of(found.models.begin(), found.models.end(), is_of);
   });
   return found;
 }

@@ -653,6 +653,7 @@ class Watch(ProjectTest):
 class Init(ProjectTest):
     def test_a_folder_becomes_a_project(self):
         (self.place / "modar.toml").unlink()
+        shutil.copy(self.place / "pictures/a.png", self.place / "models/a_albedo.png")  # a texture by its name
         done = self.modar("init", self.place)
         self.assertEqual(done.returncode, 0, done.stderr)
         text = (self.place / "modar.toml").read_text()

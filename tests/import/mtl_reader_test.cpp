@@ -202,5 +202,57 @@ TEST_F(MtlReader, LibrariesWithBlanksAndSeveralOnALine) {
   }
 }
 
+/// A model with texture coordinates that names a material file which is not there.
+void write_textured(const std::filesystem::path& path) {
+  std::ofstream(path) << "mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+                         "usemtl red\nf 1/1 2/2 3/3\nusemtl blue\nf 3/3 2/2 1/1\n";
+}
+
+TEST_F(MtlReader, ObjWithoutMaterialsTakesThePictureOfItsName) {
+  for (const char* name : {"Pawn_Albedo.PNG", "pawn diffuse.jpg", "pawn-base_color.webp"}) {
+    std::ofstream(folder_ / name) << "picture";
+    write_textured(folder_ / "pawn.obj");
+    const auto model = read_obj((folder_ / "pawn.obj").string());
+    ASSERT_TRUE(model);
+    ASSERT_EQ(model->materials.size(), 3u);
+    for (const SourceMaterial& material : model->materials) {
+      EXPECT_EQ(material.diffuse_map, (folder_ / name).string());
+      EXPECT_EQ(material.diffuse, glm::vec3(1.0f));
+    }
+    ASSERT_EQ(model->diagnostics.size(), 2u);
+    EXPECT_EQ(model->diagnostics[0].id, "obj.missing-mtl");
+    EXPECT_EQ(model->diagnostics[1].id, "model.texture-by-name");
+    std::filesystem::remove(folder_ / name);
+  }
+}
+
+TEST_F(MtlReader, OtherPicturesAreNoTextures) {
+  // That of the model's own name may be the pattern that it stands on.
+  for (const char* name : {"pawn.png", "pawn_normal.png", "pawns_albedo.png", "pawnalbedo.png",
+                           "pawn_albedo.txt", "pawn_.png", "rook_albedo.png"}) {
+    std::ofstream(folder_ / name) << "picture";
+  }
+  write_textured(folder_ / "pawn.obj");
+  const auto model = read_obj((folder_ / "pawn.obj").string());
+  ASSERT_TRUE(model);
+  EXPECT_EQ(model->materials[1].diffuse_map, "");
+  EXPECT_EQ(model->diagnostics[1].id, "model.no-texture");
+  // So that a project is baked again once it is there.
+  EXPECT_EQ(model->files.back(), (folder_ / "pawn_texture.png").string());
+  // A material file is the last word, and colours need no picture.
+  std::ofstream(folder_ / "pawn_albedo.png") << "picture";
+  std::ofstream(folder_ / "gone.mtl") << "newmtl red\nKd 1 0 0\n";
+  const auto named = read_obj((folder_ / "pawn.obj").string());
+  ASSERT_TRUE(named);
+  EXPECT_EQ(named->materials[1].diffuse_map, "");
+  std::filesystem::remove(folder_ / "gone.mtl");
+  std::ofstream(folder_ / "pawn.obj") << "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nvt 0 0\n"
+                                         "f 1/1 2/1 3/1\n";
+  const auto coloured = read_obj((folder_ / "pawn.obj").string());
+  ASSERT_TRUE(coloured);
+  EXPECT_EQ(coloured->materials[0].diffuse_map, "");
+  EXPECT_TRUE(coloured->diagnostics.empty());
+}
+
 }  // namespace
 }  // namespace modar

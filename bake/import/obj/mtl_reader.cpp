@@ -15,6 +15,7 @@
 #include "bake/import/obj/number_parser.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/import/reflection.hpp"
+#include "bake/import/texture_by_name.hpp"
 #include "bake/io/input.hpp"
 #include "formats/base/colour.hpp"
 
@@ -515,6 +516,11 @@ void ObjMaterials::resolve(const std::string& folder, const std::string& label,
                              "name it in an mtllib line"});
       paths.push_back(std::move(beside));
     }
+  }
+
+  if (paths.empty()) {
+    take_texture_by_name(folder, label, model);
+    if (!materials[0].diffuse_map.empty()) return;
   }
 
   std::map<std::string, SourceMaterial> defined;

@@ -15,6 +15,7 @@
 #include "bake/import/obj/mtl_reader.hpp"
 #include "bake/import/ply/ply_header.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/import/texture_by_name.hpp"
 #include "bake/import/up_comment.hpp"
 #include "modar/mapped_file.hpp"
 
@@ -372,7 +373,9 @@ void add_materials(const PlyHeader& header, const std::string& folder, const std
                                  "the picture '" + statement + "' is not there",
                                  "put it into the model's folder"});
   }
-  if (model.materials.empty()) model.materials.emplace_back();
+  if (!model.materials.empty()) return;
+  model.materials.emplace_back();
+  take_texture_by_name(folder, label, model);
 }
 
 Result<SourceModel> parse(std::string_view bytes, const std::string& folder,

@@ -1,0 +1,16 @@
+// The texture of a model whose file names none. Internal to this room.
+#pragma once
+
+#include <string>
+
+#include "bake/import/source_model.hpp"
+
+namespace modar {
+
+/// Gives all materials of a model that has texture coordinates and names no material file the
+/// picture beside it that is_texture_name() of; a note says which, or how to name one. What has
+/// colours at its vertices needs none. folder: the model's; empty: nothing may be read. label: the
+/// file's name in diagnostics.
+void take_texture_by_name(const std::string& folder, const std::string& label, SourceModel& model);
+
+}  // namespace modar
