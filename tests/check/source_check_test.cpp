@@ -252,6 +252,21 @@ TEST_F(SourceTest, FlagsColoursAndNamesAreThoseOfTheirSources) {
               }).count("SOURCE_MISSING"));
 }
 
+TEST_F(SourceTest, TrianglesWithoutAreaOnceRoundedAreNotMissed) {
+  // One that half floats cannot tell from a point, off the others.
+  const std::string speck = "v 1.9 0.1 -0.9\nv 1.900001 0.1 -0.9\nv 1.9 0.100001 -0.9\nf 5/1 6/2 7/3\n";
+  write_file(folder_.file("two.obj"), std::string_view(kModel + speck));
+  bake();
+  ASSERT_EQ(content_.models[0].triangle_count, 2u);
+  EXPECT_EQ(issues(), Ids());
+  const Ids found = issues([](BundleContent& content) {
+    content.levels[0].index_count = 0;
+    content.models[0].triangle_count = 1;
+  });
+  EXPECT_TRUE(found.count("SOURCE_SURFACE"));
+  EXPECT_TRUE(found.count("SOURCE_COUNTS"));
+}
+
 TEST(SourceTexts, AreThoseOfTheProject) {
   BundleContent content = pattern_content();
   content.meta =
