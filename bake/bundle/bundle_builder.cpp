@@ -137,13 +137,6 @@ void merge_stand_in(PackedMesh packed, BundleContent& content) {
   content.indices.resize((content.indices.size() + 3) / 4 * 4);
 }
 
-bool blended(const MaterialRecord& material, const BundleContent& content) {
-  if ((material.flags & kMaterialOccluder) != 0) return false;
-  if (material.opacity < 1.0f || material.texture == kNone) return material.opacity < 1.0f;
-  const std::uint32_t flags = content.textures[material.texture].flags;
-  return (flags & kTextureAlpha) != 0 && (flags & kTextureCutOut) == 0;
-}
-
 /// The order of the last model's triangles that are seen through.
 void add_draw_orders(BundleContent& content) {
   const ModelRecord& model = content.models.back();
@@ -477,6 +470,13 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
 }
 
 }  // namespace
+
+bool blended(const MaterialRecord& material, const BundleContent& content) {
+  if ((material.flags & kMaterialOccluder) != 0) return false;
+  if (material.opacity < 1.0f || material.texture == kNone) return material.opacity < 1.0f;
+  const std::uint32_t flags = content.textures[material.texture].flags;
+  return (flags & kTextureAlpha) != 0 && (flags & kTextureCutOut) == 0;
+}
 
 Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, BakeTrace* trace) {
   if (request.models.empty() && request.patterns.empty()) {

@@ -40,6 +40,9 @@ Result<void> check_inputs(const BakeRequest& request);
 /// "action.part"; those of read_image().
 Result<void> check_nodes(const BakeRequest& request);
 
+/// Is a material of a bundle seen through, and drawn after the others?
+bool blended(const MaterialRecord& material, const BundleContent& content);
+
 /// Runs all stages, after name_assets() and check_inputs(). One model and one pattern without a
 /// scene make one by themselves. trace: filled where given.
 /// Errors: those of the stages; kUsage "bake.nothing", "bake.max-error-unit".

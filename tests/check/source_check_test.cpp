@@ -120,6 +120,7 @@ class SourceTest : public ::testing::Test {
     BakeRequest request = sources();
     request.parameters = {"none"};
     if (!room_given_) request.patterns.pop_back();
+    if (model_alone_) request.patterns.clear();
     read_bake_options(bundle->meta(), request);
     std::set<std::string> ids;
     Report report;
@@ -146,6 +147,7 @@ class SourceTest : public ::testing::Test {
   ScratchFolder folder_;
   BundleContent content_;
   bool room_given_ = true;
+  bool model_alone_ = false;
 };
 
 using Ids = std::set<std::string>;
@@ -252,11 +254,29 @@ TEST_F(SourceTest, FlagsColoursAndNamesAreThoseOfTheirSources) {
               }).count("SOURCE_MISSING"));
 }
 
-TEST_F(SourceTest, TrianglesWithoutAreaOnceRoundedAreNotMissed) {
+/// A model alone, by default options.
+class SourceModel : public SourceTest {
+ protected:
+  void SetUp() override { model_alone_ = true; }
+
+  void bake(const std::string& obj, const std::string& materials = "") {
+    write_file(folder_.file("two.obj"), std::string_view(obj));
+    write_file(folder_.file("two.mtl"), std::string_view(materials));
+    Report report;
+    BakeRequest request = sources();
+    request.patterns.clear();
+    auto built = build_bundle(request, report);
+    ASSERT_TRUE(built) << to_line(built.error());
+    content_ = std::move(*built);
+    content_.summary.clear();
+  }
+};
+
+TEST_F(SourceModel, TrianglesWithoutAreaOnceRoundedAreNotMissed) {
   // One that half floats cannot tell from a point, off the others.
-  const std::string speck = "v 1.9 0.1 -0.9\nv 1.900001 0.1 -0.9\nv 1.9 0.100001 -0.9\nf 5/1 6/2 7/3\n";
-  write_file(folder_.file("two.obj"), std::string_view(kModel + speck));
-  bake();
+  const std::string speck =
+      "v 1.9 0.1 -0.9\nv 1.900001 0.1 -0.9\nv 1.9 0.100001 -0.9\nf 5/1 6/2 7/3\n";
+  bake(kModel + speck);
   ASSERT_EQ(content_.models[0].triangle_count, 2u);
   EXPECT_EQ(issues(), Ids());
   const Ids found = issues([](BundleContent& content) {
@@ -265,6 +285,29 @@ TEST_F(SourceTest, TrianglesWithoutAreaOnceRoundedAreNotMissed) {
   });
   EXPECT_TRUE(found.count("SOURCE_SURFACE"));
   EXPECT_TRUE(found.count("SOURCE_COUNTS"));
+}
+
+TEST_F(SourceModel, SheetsOfSeveralColoursAtOnePlaceAreTheirSources) {
+  constexpr const char* kSheets =
+      "v 0 0 0 1 0 0\nv 2 0 0 1 0 0\nv 0 1 1 1 0 0\nv 0 0 0 0 0 1\nv 2 0 0 0 0 1\nv 0 1 1 0 0 1\n"
+      "f 1 2 3\nf 4 6 5\n";
+  bake(kSheets);
+  EXPECT_EQ(issues(), Ids());
+  const Ids found = issues([](BundleContent& content) {
+    const AttributeRecord* colour = content.layouts[0].attributes;
+    while (colour->semantic != static_cast<std::uint8_t>(Semantic::kColour)) ++colour;
+    content.vertices[colour->offset + 1] = std::byte{255};  // green
+  });
+  EXPECT_TRUE(found.count("SOURCE_COLOUR"));
+}
+
+TEST_F(SourceModel, CardsOfGlassThatAreCutAreTheirSources) {
+  constexpr const char* kCards =
+      "mtllib two.mtl\nv 0 0 1\nv 2 0 1\nv 2 2 1\nv 0 2 1\nv 1 0 0\nv 1 0 2\nv 1 2 2\nv 1 2 0\n"
+      "usemtl glass\nf 1 2 3 4\nf 5 6 7 8\n";
+  bake(kCards, "newmtl glass\nKd 1 1 1\nd 0.5\n");
+  ASSERT_GT(content_.models[0].triangle_count, 4u);
+  EXPECT_EQ(issues(), Ids());
 }
 
 TEST(SourceTexts, AreThoseOfTheProject) {

@@ -18,6 +18,7 @@
 #include "bake/check/source/level_difference.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/mesh/draw_order.hpp"
 #include "bake/mesh/lod/reduce.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/mesh/rays/triangle_tree.hpp"
@@ -149,17 +150,32 @@ double greatest_distance(const Surface& from, TriangleTree& to) {
   return std::sqrt(greatest);
 }
 
-/// Greatest difference of a vertex's colour from the source's at the nearest point.
-double colour_error(const Surface& bundle, const Surface& source, TriangleTree& tree) {
+/// Greatest difference of a vertex's colour from those of the source's vertices within `error` of
+/// it, the most alike, as several may be at one place; where none is, from those of the nearest
+/// triangle.
+double colour_error(const Surface& bundle, const Surface& source, TriangleTree& tree,
+                    double error) {
   if (bundle.colours.empty() || source.colours.empty()) return 0;
+  std::vector<std::uint32_t> along(source.positions.size());  // by x
+  std::iota(along.begin(), along.end(), 0u);
+  const auto x_of = [&](std::uint32_t v) { return source.positions[v].x; };
+  std::ranges::sort(along, {}, x_of);
   const std::size_t step = (bundle.positions.size() + kMaxSamples - 1) / kMaxSamples;
   double greatest = 0;
   for (std::size_t i = 0; i < bundle.positions.size(); i += step) {
-    tree.nearest(bundle.positions[i]);
-    double least = 1;
-    for (const std::uint32_t v : tree.last_triangle()) {
+    const glm::dvec3& at = bundle.positions[i];
+    double least = 2;
+    const auto compare = [&](std::uint32_t v) {
       const glm::dvec4 off = glm::abs(bundle.colours[i] - source.colours[v]);
       least = std::min(least, std::max({off.x, off.y, off.z}));
+    };
+    for (auto v = std::ranges::lower_bound(along, at.x - error, {}, x_of);
+         v != along.end() && x_of(*v) <= at.x + error; ++v) {
+      if (glm::length(source.positions[*v] - at) <= error) compare(*v);
+    }
+    if (least > 1) {
+      tree.nearest(at);
+      for (const std::uint32_t v : tree.last_triangle()) compare(v);
     }
     greatest = std::max(greatest, least);
   }
@@ -340,6 +356,7 @@ class SourceCheck {
     MODAR_ASSIGN(SourceModel source, read_model(path, request.jobs));
     MODAR_ASSIGN(TriMesh mesh, weld(std::move(source), quiet, {request.jobs}));
     if (request.most_triangles != 0) mesh = reduce(std::move(mesh), request.most_triangles, quiet);
+    cut_as_baked(model, mesh);
     StageTimer timer(report, "measure");
     const Surface ours = surface_of(bundle_, model);
     const Surface theirs = surface_of(mesh);
@@ -353,7 +370,7 @@ class SourceCheck {
     const Surface lasts = left_out ? lasting(theirs, fit.stated_error) : Surface();
     fit.source_to_bundle = greatest_distance(left_out ? lasts : theirs, our_tree);
     fit.bundle_to_source = greatest_distance(ours, their_tree);
-    fit.colour_error = colour_error(ours, theirs, their_tree);
+    fit.colour_error = colour_error(ours, theirs, their_tree, fit.stated_error + rounding(model));
     timer.done(theirs.positions.size(), ours.positions.size(),
                std::max(fit.source_to_bundle, fit.bundle_to_source));
     judge_model(model, mesh, left_out ? lasts.triangles.size() : theirs.triangles.size(), fit);
@@ -366,6 +383,17 @@ class SourceCheck {
     }
     fit_.models.push_back(fit);
     return {};
+  }
+
+  /// Cuts what is seen through as the bake does.
+  void cut_as_baked(const ModelRecord& model, TriMesh& mesh) const {
+    const ModelRecord* other = namesake(again_->models, model.name);
+    if (other == nullptr || other->material_count != mesh.materials.size()) return;
+    std::vector<bool> seen_through;
+    for (std::uint32_t m = 0; m < other->material_count; ++m) {
+      seen_through.push_back(blended(again_->materials[other->first_material + m], *again_));
+    }
+    cut_crossing(mesh, seen_through);
   }
 
   /// Levels that are in the order of those baked again, byte by byte: what was changed since.
@@ -492,12 +520,17 @@ class SourceCheck {
     }
   }
 
+  /// What sums in double precision may be off by, in source units.
+  static double rounding(const ModelRecord& model) {
+    const glm::dvec3 center(model.center[0], model.center[1], model.center[2]);
+    return kRounding * (model.diagonal + glm::length(center));
+  }
+
   /// least_triangles: those of the source that no rounding can leave without area.
   void judge_model(const ModelRecord& model, const TriMesh& mesh, std::size_t least_triangles,
                    const ModelFit& fit) {
     const std::string where = label("model", model.name);
-    const double limit =
-        fit.stated_error + kRounding * (model.diagonal + glm::length(mesh.placement.center));
+    const double limit = fit.stated_error + rounding(model);
     if (!(fit.source_to_bundle <= limit && fit.bundle_to_source <= limit)) {
       tell(WorkstationRule::kSourceSurface, where, &model.position_error_max,
            "the source deviates from the bundle by up to " + std::to_string(fit.source_to_bundle) +
