@@ -259,12 +259,14 @@ class SourceModel : public SourceTest {
  protected:
   void SetUp() override { model_alone_ = true; }
 
-  void bake(const std::string& obj, const std::string& materials = "") {
+  void bake(const std::string& obj, const std::string& materials = "",
+            std::optional<PositionKind> positions = {}) {
     write_file(folder_.file("two.obj"), std::string_view(obj));
     write_file(folder_.file("two.mtl"), std::string_view(materials));
     Report report;
     BakeRequest request = sources();
     request.patterns.clear();
+    request.positions = positions;
     auto built = build_bundle(request, report);
     ASSERT_TRUE(built) << to_line(built.error());
     content_ = std::move(*built);
@@ -285,6 +287,18 @@ TEST_F(SourceModel, TrianglesWithoutAreaOnceRoundedAreNotMissed) {
   });
   EXPECT_TRUE(found.count("SOURCE_SURFACE"));
   EXPECT_TRUE(found.count("SOURCE_COUNTS"));
+}
+
+TEST_F(SourceModel, VerticesThatChunksShareAreThoseOfTheirTriangles) {
+  // Two materials far apart: integers of either chunk count from a place of its own.
+  constexpr const char* kParts =
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 9 9 9\nv 9 8 9\nv 9 9 8\nusemtl a\nf 1 2 3\nusemtl b\nf 4 5 "
+      "6\n";
+  bake(kParts, "", PositionKind::kInt16);
+  ASSERT_EQ(content_.chunks.size(), 2u);
+  ASSERT_EQ(content_.levels[0].vertex_offset, content_.levels[1].vertex_offset);
+  ASSERT_NE(content_.chunks[0].position_offset[0], content_.chunks[1].position_offset[0]);
+  EXPECT_EQ(issues(), Ids());
 }
 
 TEST_F(SourceModel, SheetsOfSeveralColoursAtOnePlaceAreTheirSources) {

@@ -80,18 +80,22 @@ Surface surface_of(const BundleView& bundle, const ModelRecord& model) {
   for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
     const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
     const LevelRecord& level = bundle.levels()[chunk.first_level];
-    const auto base = static_cast<std::uint32_t>(surface.positions.size());
-    for (std::uint32_t v = 0; v < level.vertex_count; ++v) {
+    // Chunks may share vertices: those of others are none of its own.
+    std::vector<std::uint32_t> numbers(level.vertex_count, kNone);
+    const auto number_of = [&](std::uint16_t v) {
+      if (numbers[v] != kNone) return numbers[v];
       const std::byte* vertex =
           bundle.vertices().data() + level.vertex_offset + std::size_t{v} * decoder.stride();
+      numbers[v] = static_cast<std::uint32_t>(surface.positions.size());
       surface.positions.push_back(center + model.scale * decoder.position(vertex, chunk));
       if (decoder.has(Semantic::kColour)) surface.colours.push_back(decoder.colour(vertex));
-    }
+      return numbers[v];
+    };
     const auto* indices =
         reinterpret_cast<const std::uint16_t*>(bundle.indices().data() + level.index_offset);
     for (std::uint32_t i = 0; i < level.index_count; i += 3) {
       surface.triangles.push_back(
-          {base + indices[i], base + indices[i + 1], base + indices[i + 2]});
+          {number_of(indices[i]), number_of(indices[i + 1]), number_of(indices[i + 2])});
     }
   }
   return surface;
