@@ -3,8 +3,8 @@
 
     huge_page.py BUNDLE [--max-bytes 64000000] [--line 10e6] [--latency 100] [--seconds 60] [--hold 20] [--nearest 0.02] [--page FOLDER] [--keep FOLDER]
 
-Makes the page of `modar web`, serves it by ranges, and flies: from far down to the surface, along it, and up again; after each third it
-holds still. Prints JSON: frames and the longest one of the flight (milliseconds, with the drawing, which is SwiftShader's on a CPU), the longest task of
+Makes the page of `modar web`, serves it by ranges, and flies: from far down to the surface, along it, and up again; after a third, at the
+nearest, and at the end it holds still. Prints JSON: frames and the longest one of the flight (milliseconds, with the drawing, which is SwiftShader's on a CPU), the longest task of
 the page's own, bytes that came, the greatest number of bytes on the GPU, resident memory of all of the browser's processes beside a blank
 page's, at the end of each hold the triangles and the error of what was drawn (pixels; it counts shading, the form differs by less), and
 `pops`: each time that the picture changed while the eye held still, how far what is seen moved, pixels (median, 95 and 99 % of squares of
@@ -80,15 +80,15 @@ FLY = """(async () => {
       step((now - start) / 1000 / seconds, now - before);
     }
   };
-  for (const third of [0, 1, 2]) {
-    await during(%(seconds)g / 3, (part, took) => {
+  for (const [begin, end] of [[0, 1 / 3], [1 / 3, 1 / 2], [1 / 2, 1]]) {
+    await during(%(seconds)g * (end - begin), (part, took) => {
       flown.longest = Math.max(flown.longest, took);
-      draw((third + part) / 3);
+      draw(begin + part * (end - begin));
     });
     const held = [];
     let shown = '';
     await during(%(hold)g, () => {
-      draw((third + 1) / 3);
+      draw(end);
       const what = `${drawn} ${view.lodError}`;
       if (what !== shown) held.push(models.toDataURL());
       shown = what;
