@@ -217,10 +217,6 @@ void modar_renderer_have(modar_renderer* renderer, uint32_t number) {
   renderer->renderer->have(number - 1);
 }
 
-float modar_renderer_lod_error(const modar_renderer* renderer) {
-  return renderer == nullptr ? 0.0f : renderer->renderer->stats().lod_error;
-}
-
 void modar_renderer_put(modar_renderer* renderer, uint64_t offset, const void* bytes, size_t size) {
   if (renderer == nullptr || bytes == nullptr) return;
   renderer->renderer->put(offset, {static_cast<const std::byte*>(bytes), size});

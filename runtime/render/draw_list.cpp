@@ -268,18 +268,6 @@ int DrawList::add_group(const Request& request, std::uint32_t item, std::uint32_
   return culled;
 }
 
-float DrawList::greatest_error(const BundleView& bundle) const {
-  float greatest = 0.0f;
-  for (const DrawCommand& command : commands_) {
-    const ModelView& view = views_[command.item];
-    const float error = bundle.levels()[command.level].error * view.scale * view.pixels;
-    if (error > 0.0f) {
-      greatest = std::max(greatest, error / (view.perspective ? command.distance : 1.0f));
-    }
-  }
-  return greatest;
-}
-
 std::uint64_t DrawList::cost(const BundleView& bundle, std::size_t begin, std::size_t end) const {
   std::uint64_t sum = kCallTriangles * (end - begin);
   for (std::size_t i = begin; i < end; ++i) {

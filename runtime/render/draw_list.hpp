@@ -96,8 +96,6 @@ class DrawList {
   [[nodiscard]] std::vector<DrawCommand>& commands() { return commands_; }
   [[nodiscard]] const ModelView& view(std::uint32_t item) const { return views_[item]; }
   [[nodiscard]] int culled() const { return culled_; }
-  /// Of the levels of all commands, pixels on the screen.
-  [[nodiscard]] float greatest_error(const BundleView& bundle) const;
   /// Of some commands, in triangles: a draw call counts as some, too.
   [[nodiscard]] std::uint64_t cost(const BundleView& bundle, std::size_t begin,
                                    std::size_t end) const;

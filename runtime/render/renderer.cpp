@@ -266,7 +266,6 @@ struct Renderer::State {
     list_levels();
     if (geometry.there(levels)) {
       geometry.want({});
-      stats.lod_error = list.greatest_error(bundle);
       return;
     }
     float listed = 0.0f;
@@ -292,7 +291,6 @@ struct Renderer::State {
     if (listed != fine) lacks(fine);
     geometry.want(levels);
     list.build_of(geometry, bundle, painter.setups(), projection, height, items, pixels);
-    stats.lod_error = list.greatest_error(bundle);
   }
 
   void list_levels() {

@@ -716,8 +716,12 @@ EMSCRIPTEN_KEEPALIVE const float* web_label(uint32_t node, int width, int height
   return place;
 }
 
-EMSCRIPTEN_KEEPALIVE float web_lod_error() {
-  return modar_renderer_lod_error(engine.renderer);
+/// Of what was drawn last.
+EMSCRIPTEN_KEEPALIVE uint32_t web_triangles() {
+  modar_render_stats stats{};
+  stats.size = sizeof(stats);
+  modar_renderer_stats(engine.renderer, &stats);
+  return static_cast<uint32_t>(stats.triangles);
 }
 EMSCRIPTEN_KEEPALIVE double web_gpu_bytes() {
   return static_cast<double>(modar_renderer_gpu_bytes(engine.renderer));

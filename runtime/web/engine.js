@@ -372,6 +372,11 @@ export class Engine {
     this.#module._web_draw(width, height, mirror ? 1 : 0, turn, size);
   }
 
+  /** Of what was drawn last. */
+  get triangles() {
+    return this.#module._web_triangles();
+  }
+
   get gpuBytes() {
     return this.#module._web_gpu_bytes();
   }

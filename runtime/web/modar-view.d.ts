@@ -91,6 +91,6 @@ export class View extends EventTarget {
   readonly webgl: 1 | 2;
   readonly heapBytes: number;
   readonly gpuBytes: number;
-  /** Of a bundle that is larger than maxBytes: the greatest error of a level that was drawn last, pixels of the canvas. */
-  readonly lodError: number;
+  /** Of what was drawn last. */
+  readonly triangles: number;
 }

@@ -13,8 +13,11 @@ const MOST_BYTES = 64 << 20;
 /** Milliseconds without a frame after which what turns by itself is drawn without one. */
 const STILL_MS = 60;
 const LIGHT_WIDTH = 160;
-/** Milliseconds that finer models take to replace coarser ones, and how much of a pose may change meanwhile, some pixels: more shows two models beside each other. Set by hand. */
-const FADE_MS = 250, FADE_MOVED = 0.03;
+/**
+ * Milliseconds that finer models take to replace coarser ones, and how much of a pose may change meanwhile, some pixels: more shows two
+ * models beside each other. Where a picture's share of it is exceeded, at FADE_FRAMES in that time, none begins. Set by hand.
+ */
+const FADE_MS = 250, FADE_MOVED = 0.03, FADE_FRAMES = 8;
 
 function openContext(canvas, webgl1) {
   const attributes = { alpha: true, premultipliedAlpha: true, depth: true, stencil: false, antialias: true };
@@ -76,9 +79,10 @@ export class View extends EventTarget {
   #handle = 0;
   #covered = new Map();
   #drawings = 0;
-  /** Poses of a picture that fades, and what takes it away. */
+  /** Poses of what was drawn last. */
+  #before = [];
+  /** A picture over the models: {copy, poses, triangles: of what it shows, fades: once something else was drawn}. */
   #faded = null;
-  #endFade;
 
   /**
    * @param {Modar | Uint8Array | Promise<Modar | Uint8Array>} bundle which may still be on its way
@@ -130,10 +134,10 @@ export class View extends EventTarget {
   /** What is seen is brought, when it is. @returns false: this host or browser gives all or nothing */
   async #bringWanted(arrival) {
     const { Wanted } = await import('./wanted.js');
-    const wanted = new Wanted(this.#engine, arrival.parts(), () => this.#tellRefined());
+    const wanted = new Wanted(this.#engine, arrival.parts(), () => this.#soon());
     if (!await wanted.begin()) return false;
     await this.#restored;
-    this.#fade();
+    this.#cover();
     try {
       wanted.show(this.#maxBytes, this.#fixedLight);
     } catch (error) {
@@ -145,24 +149,28 @@ export class View extends EventTarget {
     return true;
   }
 
-  /** What is drawn now fades over what is drawn from now on, while the models stand still. */
-  #fade() {
-    if (this.#empty || this.#lost || !this.#drawnAt) return;
+  /**
+   * What is drawn now stays over what is drawn from now on, and fades if that differs while the models stand still. triangles: of what
+   * was drawn just now; without, it is drawn again
+   */
+  #cover(triangles) {
+    if (this.#faded || this.#empty || this.#lost || !this.#drawnAt) return;
     const models = this.#models;
     const { width, height, className, offsetLeft, offsetTop, clientWidth, clientHeight } = models;
     const copy = Object.assign(document.createElement('canvas'), { width, height, className });
     copy.style = `position:absolute;left:${offsetLeft}px;top:${offsetTop}px;width:${clientWidth}px;height:${clientHeight}px;pointer-events:none`;
-    this.#redraw();
+    if (!triangles) this.#redraw();
     copy.getContext('2d').drawImage(models, 0, 0);
     models.after(copy);
-    this.#faded = this.#engine.poses().slice();
-    this.#endFade = () => {
-      copy.remove();
-      this.#faded = null;
-    };
-    copy.animate({ opacity: [1, 0] }, FADE_MS).onfinish = this.#endFade;
+    this.#faded = { copy, poses: this.#before, triangles };
   }
 
+  #uncover(faded) {
+    faded.copy.width = 0;  // its memory is free at once
+    faded.copy.remove();
+    if (this.#faded === faded) this.#faded = null;
+    this.#soon();
+  }
 
   #showCoarse() {
     this.#coarse = true;
@@ -187,7 +195,7 @@ export class View extends EventTarget {
       arrival = await arrival.again();
     }
     this.#arrival = arrival;
-    this.#fade();
+    this.#cover();
     this.#engine.showAll(this.#fixedLight);
     this.#told();
   }
@@ -319,12 +327,25 @@ export class View extends EventTarget {
 
   /** Acts and draws what was drawn last. */
   #again() {
-    if (this.#faded) {  // a picture of other poses would be seen beside the models
-      const poses = this.#engine.poses();
-      if (this.#faded.some((value, i) => i % POSE_FLOATS >= POSE.view && Math.abs(value - poses[i]) > FADE_MOVED)) this.#endFade();
-    }
+    const poses = this.#engine.poses().slice();
+    const moved = (since, most) => since.some((value, i) => i % POSE_FLOATS >= POSE.view && Math.abs(value - poses[i]) > most);
+    const still = !moved(this.#before, FADE_MOVED / FADE_FRAMES);
+    this.#before = poses;
     this.#act();
     this.#redraw();
+    const { triangles } = this.#engine;
+    const faded = this.#faded;
+    if (faded && (faded.triangles === triangles || moved(faded.poses, FADE_MOVED))) {
+      this.#uncover(faded);
+    } else if (faded && !faded.fades) {
+      faded.fades = faded.copy.animate({ opacity: [1, 0] }, FADE_MS);
+      faded.fades.onfinish = () => this.#uncover(faded);
+    }
+    if (this.#wanted?.came && !this.#faded) {
+      if (still) this.#cover(triangles);
+      this.#wanted.use();
+      this.#tellRefined();
+    }
     this.#wanted?.ask();
     this.#drawn();
   }
@@ -488,7 +509,7 @@ export class View extends EventTarget {
     return this.#engine.gpuBytes;
   }
 
-  get lodError() {
-    return this.#wanted?.lodError ?? 0;
+  get triangles() {
+    return this.#engine.triangles;
   }
 }

@@ -20,8 +20,10 @@ export class Wanted {
   #tries = new Map();
   #requests = 0;
   #take;
+  /** Numbers of what has come since use(). */
+  #came = [];
 
-  /** parts: of an arrival. onMore: is called when a finer picture can be drawn. */
+  /** parts: of an arrival. onMore: is called when there is something for use(). */
   constructor(engine, parts, onMore) {
     this.#engine = engine;
     this.#parts = parts;
@@ -58,15 +60,20 @@ export class Wanted {
     return at === 0 ? null : [...new Uint32Array(this.#engine.module.HEAPU8.buffer, at, count)];
   }
 
-  /** Draws the finest that has come from now on, within so many bytes of the GPU: in a new context, from the beginning. */
+  /** Draws the finest that use() is told of from now on, within so many bytes of the GPU: in a new context, from the beginning. */
   show(gpuBytes, fixedLight) {
     this.#open.clear();
+    this.#came = [];
     this.#engine.check(this.#engine.module._web_show_wanted(gpuBytes, fixedLight ? 1 : 0));
   }
 
-  /** The greatest error of what was drawn last, pixels. */
-  get lodError() {
-    return this.#engine.module._web_lod_error();
+  get came() {
+    return this.#came.length > 0;
+  }
+
+  /** What has come is drawn from now on. */
+  use() {
+    for (const number of this.#came.splice(0)) this.#engine.module._web_have(number);
   }
 
   /** After a picture: what it lacked; more of it when something has come, however slow pictures are. */
@@ -74,7 +81,7 @@ export class Wanted {
     for (let next; this.#openBytes() < MOST_OPEN && (next = this.#numbers(this.#engine.module._web_open_wanted(), 3));) {
       const [number, offset, size] = next;
       this.#add(this.#piecesOf(offset, size), () => {
-        this.#engine.module._web_have(number);
+        this.#came.push(number);
         this.ask();
         this.#onMore();
       });

@@ -4,11 +4,11 @@
     huge_page.py BUNDLE [--max-bytes 64000000] [--line 10e6] [--latency 100] [--seconds 60] [--hold 20] [--nearest 0.02] [--page FOLDER] [--keep FOLDER]
 
 Makes the page of `modar web`, serves it by ranges, and flies: from far down to the surface, along it, and up again; after a third, at the
-nearest, and at the end it holds still. Prints JSON: frames and the longest one of the flight (milliseconds, with the drawing, which is SwiftShader's on a CPU), the longest task of
-the page's own, bytes that came, the greatest number of bytes on the GPU, resident memory of all of the browser's processes beside a blank
-page's, at the end of each hold the triangles and the error of what was drawn (pixels; it counts shading, the form differs by less), and
-`pops`: each time that the picture changed while the eye held still, how far what is seen moved, pixels (median, 95 and 99 % of squares of
-32 pixels, by phase correlation). Needs python3-opencv for the pops.
+nearest, and at the end it holds still. Prints JSON: frames and the longest one of the flight (milliseconds, with the drawing, which is
+SwiftShader's on a CPU), the longest task of the page's own, bytes that came, the greatest number of bytes on the GPU, resident memory of
+all of the browser's processes beside a blank page's, the triangles that were drawn at the end of each hold, and `pops`: each time that the
+picture changed while the eye held still, how far what is seen moved, pixels (median, 95 and 99 % of squares of 32 pixels, by phase
+correlation), from one picture to the next of 30 a second, and in all. Needs python3-opencv for the pops.
 
 `modar-model-probe make SCAN TRIANGLES OUT.obj` makes a huge scan out of one; bake it with default options. Needs modar on the path,
 chromium, and the page's engine (preset `web`).
@@ -37,15 +37,7 @@ SQUARE = 32  # pixels, of which the way is measured
 FLY = """(async () => {
   const [{ load }, { View }] = await Promise.all([import('/modar.js'), import('/modar-view.js')]);
   """ + CANVAS + """
-  const flown = globalThis.flown = { frames: 0, longest: 0, task: 0, gpu: 0, errors: [], triangles: [], pictures: [], done: false };
-  let drawn = 0;
-  for (const name of ['drawElements', 'drawElementsInstanced']) {
-    const own = WebGL2RenderingContext.prototype[name];
-    WebGL2RenderingContext.prototype[name] = function (mode, count, ...rest) {
-      drawn += count / 3;
-      return own.call(this, mode, count, ...rest);
-    };
-  }
+  const flown = globalThis.flown = { frames: 0, longest: 0, task: 0, gpu: 0, triangles: [], pictures: [], done: false };
   new PerformanceObserver((list) => {
     for (const { duration } of list.getEntries()) flown.task = Math.max(flown.task, duration);
   }).observe({ type: 'longtask' });
@@ -69,7 +61,6 @@ FLY = """(async () => {
     return Float32Array.of(right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0, dot(right), dot(up), dot(back), 1);
   };
   const draw = (share) => {
-    drawn = 0;
     view.drawFrom(0, from(share), 500);
     ++flown.frames;
     flown.gpu = Math.max(flown.gpu, view.gpuBytes);
@@ -80,22 +71,40 @@ FLY = """(async () => {
       step((now - start) / 1000 / seconds, now - before);
     }
   };
+  // What is seen while a picture fades over the models, 30 times a second.
+  const fade = (over) => {
+    const [animation] = over.getAnimations();
+    animation.pause();
+    const both = document.createElement('canvas').getContext('2d');
+    Object.assign(both.canvas, { width: models.width, height: models.height });
+    const seen = [];
+    for (let time = 0; time <= animation.effect.getTiming().duration; time += 1000 / 30) {
+      animation.currentTime = time;
+      both.clearRect(0, 0, models.width, models.height);
+      both.globalAlpha = 1;
+      both.drawImage(models, 0, 0);
+      both.globalAlpha = getComputedStyle(over).opacity;
+      both.drawImage(over, 0, 0);
+      seen.push(both.canvas.toDataURL());
+    }
+    animation.finish();
+    return [...seen, models.toDataURL()];
+  };
   for (const [begin, end] of [[0, 1 / 3], [1 / 3, 1 / 2], [1 / 2, 1]]) {
     await during(%(seconds)g * (end - begin), (part, took) => {
       flown.longest = Math.max(flown.longest, took);
       draw(begin + part * (end - begin));
     });
     const held = [];
-    let shown = '';
+    let shown = 0;
     await during(%(hold)g, () => {
       draw(end);
-      const what = `${drawn} ${view.lodError}`;
-      if (what !== shown) held.push(models.toDataURL());
-      shown = what;
+      const over = models.nextElementSibling;
+      if (view.triangles !== shown) held.push(over?.getAnimations().length ? fade(over) : [models.toDataURL()]);
+      shown = view.triangles;
     });
     flown.pictures.push(held);
-    flown.triangles.push(drawn);
-    flown.errors.push(view.lodError);
+    flown.triangles.push(view.triangles);
   }
   flown.done = true;
 })().catch((error) => { globalThis.flown = { done: true, error: String(error.stack ?? error) }; }), 0"""
@@ -127,28 +136,40 @@ class Ranged(Quiet):
             pass  # the page has what it wants
 
 
-def pops(pictures):
-    """Of each picture after the first: how far squares of it moved, by their median, 95 and 99 %."""
+def ways(before, after):
+    """How far squares of 32 pixels moved, by their median, 95 and 99 %: pictures as read() has them."""
     import cv2
     import numpy
 
-    def read(url):
-        picture = cv2.imdecode(numpy.frombuffer(base64.b64decode(url.split(",")[1]), numpy.uint8), cv2.IMREAD_UNCHANGED).astype(numpy.float32)
-        shown = picture[..., 3] / 255
-        return cv2.GaussianBlur(picture[..., :3].mean(2) * shown + 128 * (1 - shown), (0, 0), 1.5), shown
     moved, window = [], cv2.createHanningWindow((SQUARE, SQUARE), cv2.CV_32F)
-    for (before, _), (after, shown) in itertools.pairwise(map(read, pictures)):
-        ways = []
-        for y, x in itertools.product(*(range(0, side + 1 - SQUARE, SQUARE // 2) for side in after.shape)):
-            square = numpy.s_[y:y + SQUARE, x:x + SQUARE]
-            if shown[square].mean() < 0.3 or before[square].std() < 2:
-                continue
-            way, sure = cv2.phaseCorrelate(before[square] - before[square].mean(), after[square] - after[square].mean(), window)
-            if sure > 0.3:
-                ways.append(math.hypot(*way))
-        if ways:
-            moved.append([round(float(numpy.percentile(ways, part)), 2) for part in (50, 95, 99)])
-    return moved
+    for y, x in itertools.product(*(range(0, side + 1 - SQUARE, SQUARE // 2) for side in after[0].shape)):
+        square = numpy.s_[y:y + SQUARE, x:x + SQUARE]
+        old, new = before[0][square], after[0][square]
+        if after[1][square].mean() < 0.3 or old.std() < 2:
+            continue
+        way, sure = cv2.phaseCorrelate(old - old.mean(), new - new.mean(), window)
+        if sure > 0.3:
+            moved.append(math.hypot(*way))
+    return [float(numpy.percentile(moved, part)) for part in (50, 95, 99)] if moved else [0.0, 0.0, 0.0]
+
+
+def read(url):
+    """(brightness, what is covered) of a picture."""
+    import cv2
+    import numpy
+
+    picture = cv2.imdecode(numpy.frombuffer(base64.b64decode(url.split(",")[1]), numpy.uint8), cv2.IMREAD_UNCHANGED).astype(numpy.float32)
+    shown = picture[..., 3] / 255
+    return cv2.GaussianBlur(picture[..., :3].mean(2) * shown + 128 * (1 - shown), (0, 0), 1.5), shown
+
+
+def pops(changes):
+    """Of each change after the first, which is pictures one after the other: the greatest ways from one to the next, and from before it to its end."""
+    found = []
+    for (*_, before), change in itertools.pairwise([[read(url) for url in change] for change in changes]):
+        steps = zip(*(ways(*pair) for pair in itertools.pairwise([before, *change])))
+        found.append({"step": [round(max(each), 2) for each in steps], "all": [round(way, 2) for way in ways(before, change[-1])]})
+    return found
 
 
 def fly(site, bundle, options):

@@ -41,6 +41,7 @@ DRAW = """(async () => {
     const context = on.getContext('2d', { alpha: false });
     context.drawImage(copy, 0, 0);
     const bytes = await (await new Promise((resolve) => { on.toBlob(resolve, 'image/png'); })).arrayBuffer();
+    while (copy.getAnimations().length === 0) await new Promise(requestAnimationFrame);  // until something else is drawn
     const [{ effect }] = copy.getAnimations();
     const seen = [...new Uint8Array(await crypto.subtle.digest('SHA-1', bytes))].join();
     return { seen, to: effect.getKeyframes().at(-1).opacity, ms: effect.getTiming().duration };

@@ -21,7 +21,8 @@ from programs import COVER, QUICK, ProgramTest  # noqa: E402
 
 STEPS = 72  # squares along a side of each ground
 BUDGET = 300_000  # bytes: one of them from near, and what is drawn until it has come
-# Opens a view of a bundle, then draws it from places above the ground, [x, y, height] in its plane, each until nothing more comes.
+# Opens a view of a bundle, then draws it from places above the ground, [x, y, height] in its plane, each until nothing more comes; the
+# eye goes to and fro by `sway`.
 LOOK = """(async () => {
   const [{ load }, { View }] = await Promise.all([import('/modar.js'), import('/modar-view.js')]);
   """ + CANVAS + """
@@ -31,7 +32,7 @@ LOOK = """(async () => {
     const bytes = await (await view.photograph('image/png')).arrayBuffer();
     return [...new Uint8Array(await crypto.subtle.digest('SHA-1', bytes))].join();
   };
-  const seen = { first: null, last: [], most: 0, longest: 0, frames: 0, told: [] };
+  const seen = { first: null, last: [], most: 0, longest: 0, frames: 0, fades: 0, told: [] };
   console.info = (text) => seen.told.push(text);
   let modar;
   try {
@@ -44,13 +45,15 @@ LOOK = """(async () => {
       seen.first ??= await hash(view, place);
       refined = performance.now();
       for (let before = refined, now; (now = await new Promise(requestAnimationFrame)) - refined < %(patience)d; before = now) {
-        view.drawFrom(0, from(place), 300);
+        view.drawFrom(0, from([place[0] + %(sway)g * (seen.frames %% 2), place[1], place[2]]), 300);
+        seen.fades = Math.max(seen.fades, document.getAnimations().length);
         seen.most = Math.max(seen.most, view.gpuBytes);
         seen.longest = Math.max(seen.longest, now - before);
         ++seen.frames;
       }
       seen.last.push(await hash(view, place));
     }
+    seen.left = document.querySelectorAll('canvas').length;
   } catch (error) {
     seen.error = error.code ?? String(error);
   }
@@ -148,9 +151,10 @@ class Wanted(ProgramTest):
         cls.whole = cls.look("whole/ground.packed", [cls.NEAR, cls.OTHER, cls.THIRD], budget=0)
 
     @classmethod
-    def look(cls, name, places, budget=BUDGET, patience=700):
+    def look(cls, name, places, budget=BUDGET, patience=700, sway=0):
         first = f"?first={cls.http.first[name.split('/')[1]]}" if name.endswith(".packed") else ""
-        return cls.browser.run(LOOK % {"source": json.dumps(f"/{name}{first}"), "budget": budget, "places": json.dumps(places), "patience": patience})
+        return cls.browser.run(LOOK % {"source": json.dumps(f"/{name}{first}"), "budget": budget, "places": json.dumps(places), "patience": patience,
+                                       "sway": sway})
 
     def brought(self, kind):
         """Bytes of the last stage that were asked for."""
@@ -170,9 +174,14 @@ class Wanted(ProgramTest):
                 self.assertNotEqual(seen["first"], near, "first what is there: the coarsest")
                 print(f"{name}: {seen['most']} bytes on the GPU of {self.whole['most']}, longest of {seen['frames']} frames {seen['longest']:.0f} ms")
                 self.assertLessEqual(seen["most"], BUDGET)
+                self.assertEqual((seen["fades"], seen["left"]), (1, 2), "what was seen fades over what is finer, one picture at a time")
         # What made room for the others is brought again, and not all is ever brought.
         asked = [(start, end) for start, end in self.http.ranges["right"] if end > start]
         self.assertGreater(len(asked), len(set(asked)))
+
+    def test_nothing_fades_before_an_eye_that_moves(self):
+        seen = self.look("right/ground.packed", [self.NEAR], sway=0.01)
+        self.assertEqual((seen["last"], seen["fades"], seen["left"]), (self.whole["last"][:1], 0, 2))
 
     def test_no_picture_waits_for_a_slow_host(self):
         self.http.most_at_once = 0

@@ -349,8 +349,6 @@ MODAR_EXPERIMENTAL void modar_renderer_put(modar_renderer* renderer, uint64_t of
 MODAR_EXPERIMENTAL uint32_t modar_renderer_open_wanted(modar_renderer* renderer, uint64_t* offset,
                                                        uint64_t* byte_count);
 MODAR_EXPERIMENTAL void modar_renderer_have(modar_renderer* renderer, uint32_t number);
-/* The greatest error of what that renderer drew last, pixels on the screen. */
-MODAR_EXPERIMENTAL float modar_renderer_lod_error(const modar_renderer* renderer);
 void modar_renderer_destroy(modar_renderer* renderer);
 /* After a lost context, with the new one current: uploads everything again from the bundle's bytes.
  */

@@ -125,8 +125,6 @@ struct RenderStats {
   std::uint64_t triangles = 0;
   std::uint64_t bytes_uploaded = 0;  ///< background, uniforms and streamed buffers of this frame
   std::uint64_t evictions = 0;       ///< buffers that were evicted in this frame
-  /// Of Renderer::Part::kWanted: the greatest error of a level that was drawn, pixels.
-  float lod_error = 0.0f;
 };
 
 /// GL memory of the bundle.
