@@ -5,7 +5,7 @@
 
 Makes the page of `modar web`, serves it by ranges, and flies: from far down to the surface, along it, and up again; after a third, at the
 nearest, and at the end it holds still. Prints JSON: frames and the longest one of the flight (milliseconds, with the drawing, which is
-SwiftShader's on a CPU), the longest task of the page's own, bytes that came, the greatest number of bytes on the GPU, resident memory of
+SwiftShader's on a CPU), the longest task of the page's own, bytes that came, those of them that had come before, the greatest number of bytes on the GPU, resident memory of
 all of the browser's processes beside a blank page's, the triangles that were drawn at the end of each hold, and `pops`: each time that the
 picture changed while the eye held still, how far what is seen moved, pixels (median, 95 and 99 % of squares of 32 pixels, by phase
 correlation), from one picture to the next of 30 a second, and in all. Needs python3-opencv for the pops.
@@ -131,9 +131,22 @@ class Ranged(Quiet):
                     self.wfile.write(part)
                     first += len(part)
                     if path.suffix in (".packed", ".modar"):
-                        self.server.sent += len(part)
+                        self.server.count(first - len(part), first)
         except OSError:
             pass  # the page has what it wants
+
+
+class Host(http.server.ThreadingHTTPServer):
+    def __init__(self, site):
+        super().__init__(("127.0.0.1", 0), functools.partial(Ranged, directory=str(site)))
+        self.sent, self.again, self.kilobytes, self.lock = 0, 0, set(), threading.Lock()
+
+    def count(self, begin, end):
+        kilobytes = {*range(-(-begin // 1024), end // 1024)}
+        with self.lock:
+            self.sent += end - begin
+            self.again += 1024 * len(kilobytes & self.kilobytes)
+            self.kilobytes |= kilobytes
 
 
 def ways(before, after):
@@ -173,8 +186,7 @@ def pops(changes):
 
 
 def fly(site, bundle, options):
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Ranged, directory=str(site)))
-    server.sent = 0
+    server = Host(site)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     folder = tempfile.mkdtemp(prefix="modar-huge-")
     browser = Browser(folder, "none.y4m")
@@ -190,7 +202,7 @@ def fly(site, bundle, options):
             time.sleep(1)
         flown = browser.run("globalThis.flown ?? {}")
         flown["pops"] = [pops(held) for held in flown.pop("pictures", [])]
-        flown.update(came_mb=server.sent / 1e6, rss_mb=(sum(settle(browser).values()) - blank) / 1e6, rss_most_mb=(most - blank) / 1e6)
+        flown.update(came_mb=server.sent / 1e6, again_mb=server.again / 1e6, rss_mb=(sum(settle(browser).values()) - blank) / 1e6, rss_most_mb=(most - blank) / 1e6)
         return flown
     finally:
         browser.close()
