@@ -105,6 +105,9 @@ PrintDifference compare_prints(const TrackedPattern& first, const TrackedPattern
 Mirror most_alike_mirror(const TrackedPattern& pattern, bool upright,
                          const std::array<bool, kCells>& those);
 
+/// Whether a flat pattern looks like itself a step to the side or down, as grids and keyboards do.
+bool regular(const TrackedPattern& pattern);
+
 /// Whether two patterns have one shape and much of their picture in common, as a series' prints do:
 /// a quarter of the textured cells.
 bool related(const TrackedPattern& a, const TrackedPattern& b);

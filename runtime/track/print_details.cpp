@@ -30,6 +30,8 @@ constexpr std::uint32_t kDetailStride = 97;  // spreads the cells; coprime to th
 // to tell or show nothing: letters of another title seldom fill a cell. Not beside the print's
 // edge, where a finger that lies still passes for printed (pose_loop_prints_test).
 constexpr int kSurePrinted = 2;
+// Cells with detail below which their mean says nothing.
+constexpr int kLeastDetails = 12;
 // How many times less than its samples the frame may resolve.
 constexpr double kResolved = 1.01;
 
@@ -115,7 +117,8 @@ void PrintDetails::next_quarter(Cell& cell) {
 }
 
 void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
-                        std::span<const GrayImage> pyramid, const glm::vec3& from, int count) {
+                        std::span<const GrayImage> pyramid, const glm::vec3& from, int count,
+                        bool all) {
   if (!print.surface.flat()) return;
   const CellGrid whole(print, map, pyramid, kSide);
   if (whole.spread() > kResolved) return;
@@ -127,8 +130,9 @@ void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
   for (int tried = 0; tried < kDetailCells && count > 0; ++tried, ++next_) {
     const std::uint32_t at = next_ * kDetailStride % kDetailCells;
     Cell& cell = cells_[at];
-    if (cell.state == CellState::kAgrees || cell.state == CellState::kPlain) continue;
-    const bool part = cell.quarter > 0;
+    const bool done = cell.state == CellState::kAgrees || cell.state == CellState::kPlain;
+    if (done && !all) continue;
+    const bool part = cell.quarter > 0 && !all;
     if (part && !closer) continue;
     --count;
     const int side = part ? 2 * kSide : kSide;
@@ -143,6 +147,10 @@ void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
       match.correlation = std::max(match.correlation, compare(blurred, seen).correlation);
       coarse = compare(expected, blurred).correlation >= kCoarse;
     }
+    if (!part && match.expected_contrast >= kDetailed) {
+      cell.likeness = static_cast<std::uint8_t>(1.0f + 99.0f * std::max(0.0f, match.correlation));
+    }
+    if (all && (done || cell.quarter > 0)) continue;
     update(cell, match, coarse, seen, from);
     if (!part && cell.state != CellState::kAgrees && !cell.edge_agrees) {
       cell.edge_agrees = edge_agrees(static_cast<int>(at), expected, seen);
@@ -152,6 +160,18 @@ void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
     // the frames after two seconds, 31 % without quarters; no true print hides.
     if (part || (!coarse && closer && cell.edge_agrees)) next_quarter(cell);
   }
+}
+
+double PrintDetails::likeness(const std::array<bool, kCells>& those) const {
+  int sum = 0;
+  int count = 0;
+  for (std::size_t at = 0; at < cells_.size(); ++at) {
+    const std::size_t cell = at / kSide / 2 * kCellSide + at % kSide / 2;
+    if (!those[cell] || cells_[at].likeness == 0) continue;
+    sum += cells_[at].likeness;
+    ++count;
+  }
+  return count < kLeastDetails ? 1.0 : 0.01 * sum / count;
 }
 
 namespace {

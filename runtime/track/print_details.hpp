@@ -25,9 +25,13 @@ class PrintDetails {
   static constexpr int kSide = 2 * kCellSide;
   static constexpr int kDetailCells = kSide * kSide;
 
-  /// Compares `count` cells that do not agree yet. from: direction from the pattern to the camera.
+  /// Compares `count` cells that do not agree yet; kDetailCells: all, for likeness(). from:
+  /// direction from the pattern to the camera.
   void look(const TrackedPattern& print, const PlaneMap& map, std::span<const GrayImage> pyramid,
-            const glm::vec3& from, int count);
+            const glm::vec3& from, int count, bool all = false);
+  /// Mean correlation of what has detail in the verifier's cells of this mask, as last seen, 0 to
+  /// 1; 1 where hardly any has.
+  [[nodiscard]] double likeness(const std::array<bool, kCells>& those) const;
   /// Cells of printed differences that cells in agreement surround.
   [[nodiscard]] int differences() const;
 
@@ -42,10 +46,11 @@ class PrintDetails {
   };
   struct Cell {
     CellState state = CellState::kUnseen;
-    std::uint8_t looks = 0;    ///< that showed the same
-    std::uint8_t quarter = 0;  ///< 1 to 4: that is compared, as the whole is too fine to tell
-    bool edge_agrees = false;  ///< its half at the print's edge did once, or it has none
-    glm::vec3 from{};          ///< direction from which `shown` was seen
+    std::uint8_t looks = 0;     ///< that showed the same
+    std::uint8_t likeness = 0;  ///< correlation where there is detail, percent; 0: none seen
+    std::uint8_t quarter = 0;   ///< 1 to 4: that is compared, as the whole is too fine to tell
+    bool edge_agrees = false;   ///< its half at the print's edge did once, or it has none
+    glm::vec3 from{};           ///< direction from which `shown` was seen
     std::array<std::uint8_t, kCellSamples * kCellSamples> shown{};
   };
   static void update(Cell& cell, const CellMatch& match, bool coarse, const CellSamples& seen,

@@ -75,6 +75,7 @@ class PrintVerifier {
     std::uint32_t next_other = 0;
     bool other_print = false;
     bool other_details = false;  ///< a small part of it differs
+    bool at_large = false;       ///< lacks_detail() when that was measured last
     bool flipped = false;
     bool curved = false;
     bool was_bent = false;  ///< at the last measurement
@@ -95,12 +96,14 @@ class PrintVerifier {
   bool related_to(std::size_t a, std::size_t b, int& work);
   static double agreeing_share(const Evidence& seen);
   static bool scattered(const Evidence& seen);
+  static bool lacks_detail(const Evidence& seen);
   static void forget_mirrors(Evidence& seen);
   static Verification conclude(const TrackedPattern& print, Evidence& seen);
 
   std::span<const TrackedPattern> patterns_;
   bool known_camera_;
   std::vector<Evidence> evidence_;       ///< by pattern
+  std::vector<std::uint8_t> regular_;    ///< by pattern: whether it is regular()
   std::vector<std::uint8_t> relations_;  ///< by two patterns: 0 not known yet, 1 none, 2 related
   /// By pattern: an upright mirror and one that is not, as place_mirrors() left them.
   std::vector<std::array<Mirror, 2>> mirrors_;

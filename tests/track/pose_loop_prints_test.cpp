@@ -355,7 +355,7 @@ TEST(Prints, APoseBesideThePatternHasSlippedUnlessSomethingCoversIt) {
   EXPECT_TRUE(verifier.has_slipped(0, see(plain), track));
 }
 
-// As regular prints agree with each other: here and there, and roughly. What covers a print leaves
+// As prints agree with others: here and there, and roughly. What covers a print leaves
 // whole parts of it as they are.
 TEST(Prints, OneThatAgreesHereAndThereIsNotShown) {
   const auto pattern = tracker::view_tracked_pattern(record(), 0);
@@ -392,15 +392,66 @@ TEST(Prints, OneThatAgreesHereAndThereIsNotShown) {
   const auto whole = verify([](int x, int) { return x < 3 ? 1.0 : 0.0; });
   EXPECT_EQ(whole.reason, Reason::kVisible) << whole.agreeing;
   EXPECT_LT(whole.agreeing, 0.5);
-  // As a sheet of markers and a grid of codes do: two thirds agree, each cell as it happens.
-  constexpr double kUneven = 0.52;
-  const auto grid = verify([](int x, int y) { return (3 * x + 2 * y) % 5 > 0 ? kUneven : 0.0; });
-  EXPECT_GT(grid.agreeing, 0.6);
-  EXPECT_LT(grid.agreeing, 0.8);
-  EXPECT_EQ(grid.reason, Reason::kFailedVerification) << grid.agreeing << " " << grid.likeness;
-  const auto most = verify([](int x, int) { return x < 5 ? 1.0 : 0.0; });
-  EXPECT_GT(most.agreeing, 0.6);
-  EXPECT_EQ(most.reason, Reason::kVisible) << most.agreeing;
+}
+
+/// Dark squares, of 5 x 4 with a code in each.
+cv::Mat code_grid(std::uint64_t seed) {
+  constexpr int kPitch = 60;
+  constexpr int kBits = 5;
+  constexpr int kModule = 7;
+  cv::Mat print(240, 300, CV_8UC1, cv::Scalar(245));
+  Random random(seed);
+  for (int y = 5; y < print.rows; y += kPitch) {
+    for (int x = 5; x < print.cols; x += kPitch) {
+      print(cv::Rect(x, y, (kBits + 2) * kModule, (kBits + 2) * kModule)).setTo(15);
+      for (int k = 0; k < kBits * kBits; ++k) {
+        const cv::Rect module(x + (k % kBits + 1) * kModule, y + (k / kBits + 1) * kModule, kModule,
+                              kModule);
+        print(module).setTo(random.next() % 2 == 0 ? 20 : 240);
+      }
+    }
+  }
+  return print;
+}
+
+// Most cells of a grid agree with another grid of its pitch. What its squares hold does not.
+TEST(Prints, AnotherGridOfThePitchIsNotShown) {
+  const cv::Mat own = code_grid(1);
+  const auto bytes = record_of(own);
+  const auto pattern = tracker::view_tracked_pattern(bytes, 0);
+  ASSERT_TRUE(pattern) << to_line(pattern.error());
+  EXPECT_TRUE(tracker::regular(*pattern));
+  EXPECT_FALSE(tracker::regular(*tracker::view_tracked_pattern(record(), 0)));
+  const Camera camera = default_camera(kWidth, kHeight);
+  const auto extractor = FeatureExtractor::create(kWidth, kHeight, {});
+  tracker::PatchCache patches;
+  tracker::Track track;
+  track.pose = pose_of(look_at(2.2, 10, 20, 10));
+  tracker::PrintVerifier verifier(std::span(&*pattern, 1));
+  const auto see = [&](const cv::Mat& print, double covered) {
+    SceneBand band;
+    band.covered_low = band.covered_high = covered;
+    Random random(5);
+    const SceneFrame scene = render_still(gray(print), camera, track.pose,
+                                          clutter(kWidth, kHeight, 77), band, random, 0.65, {});
+    extractor->set_frame(scene.picture.view());
+    return tracker::FrameView{camera, extractor->pyramid(), tracker::kernels(), patches};
+  };
+  for (const std::uint64_t other : {2u, 3u, 4u}) {
+    const auto found = verifier.verify_found(0, see(code_grid(other), 0), track, false);
+    EXPECT_GT(found.agreeing, 0.6) << other;
+    EXPECT_EQ(found.reason, Reason::kFailedVerification) << other;
+  }
+  // The print itself in its place is shown again.
+  tracker::PrintVerifier::Verification held;
+  for (int frame = 0; frame < 32; ++frame) {
+    held = verifier.verify_tracked(0, see(own, 0), track);
+  }
+  EXPECT_EQ(held.reason, Reason::kVisible);
+  for (const double covered : {0.0, 0.5}) {
+    const auto found = verifier.verify_found(0, see(own, covered), track, false);
+    EXPECT_EQ(found.reason, Reason::kVisible) << covered << " " << found.agreeing;
+  }
 }
 
 TEST(Prints, APoseThatItsPatchesContradictIsNotShown) {
