@@ -475,7 +475,10 @@ void print_confusion(const Confusion& confusion) {
     std::printf("\n");
   }
   for (const auto& [a, b] : confusion.keep_apart()) {
-    std::printf("keep apart: %s and %s\n", confusion.names[a].c_str(), confusion.names[b].c_str());
+    const bool told_apart = confusion.together == 0;
+    std::printf("%s: %s and %s\n",
+                told_apart ? "bake into one bundle, where they are told apart" : "keep apart",
+                confusion.names[a].c_str(), confusion.names[b].c_str());
   }
   for (std::size_t i = 0; i < count; ++i) {
     if (confusion.mirrored[i] == 0) continue;

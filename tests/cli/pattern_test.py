@@ -177,6 +177,19 @@ class Pattern(ProgramTest):
         twice = self.modar("pattern", "confusion", "b.modar", "b.modar", "--views", "2")
         self.assertEqual(twice.returncode, 3)
         self.assertIn("false recognitions: 4", twice.stdout)
+        self.assertIn("keep apart: part and part", twice.stdout)
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg")
+    def test_confusion_says_whom_one_bundle_tells_apart(self):
+        other = self.folder / "edition.png"
+        subprocess.run(["ffmpeg", "-v", "error", "-y", "-i", self.part, "-vf", "split[a][b];[b]crop=iw:ih*2/5:0:ih*3/5,hflip,vflip[c];"
+                        "[a][c]overlay=0:H*3/5", "-frames:v", "1", other], check=True)
+        for name, picture in (("a", self.part), ("b", other)):
+            done = self.modar("bake", "--pattern", picture, "-o", f"{name}.modar", "--quiet", *QUICK)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        done = self.modar("pattern", "confusion", "a.modar", "b.modar", "--views", "2")
+        self.assertEqual(done.returncode, 3, done.stdout)
+        self.assertIn("bake into one bundle, where they are told apart: part and edition", done.stdout)
 
     def test_bench_prints_the_article_s_tables_beside_ours(self):
         rows = self.lab_json("bench", "pose", "--tables", "--patterns", GAME, "--backgrounds", COVER, "--frames", "1",
