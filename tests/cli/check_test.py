@@ -199,6 +199,19 @@ class Check(ProgramTest):
             self.assertLess(level["difference_p99"], 2)
         self.assertLess(levels[-1]["triangles"], levels[0]["triangles"])
 
+    def test_occlusion_is_no_difference_from_the_source(self):
+        # Thirty leaves of a book, open at the sides: deep in between, light comes from few sides.
+        with open(self.folder / "leaves.obj", "w") as file:
+            for i in range(30):
+                file.write("".join(f"v {x} {y} {0.05 * i}\n" for y in range(9) for x in range(9)))
+                for k in (81 * i + 9 * y + x + 1 for y in range(8) for x in range(8)):
+                    file.write(f"f {k} {k + 1} {k + 10} {k + 9}\n")
+        path = self.folder / "leaves.modar"
+        done = self.modar("bake", "--model", "leaves.obj", "-o", path, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        looks = json.loads(self.check(0, path, "--json", "--source", "leaves.obj", "--visual", self.folder / "leaves-looks"))
+        self.assertLess(looks["looks"][0]["delta_e_worst"], 2.5)
+
     def test_rough_models_are_looked_at_in_many_samples(self):
         # Where every sample falls on another triangle, pictures of 16 samples a pixel differ by 2.75 of 255.
         side, rough = 60, random.Random(1)

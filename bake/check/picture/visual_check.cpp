@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <filesystem>
 #include <memory>
 
@@ -66,10 +67,35 @@ bool translucent(const TriMesh& mesh) {
   });
 }
 
+/// The bytes of a bundle whose vertices all get all of the light from around: a source says nothing
+/// of occlusion, and the reference has none.
+std::vector<std::byte> without_occlusion(const BundleView& bundle) {
+  constexpr auto kAllLight = std::byte{127};
+  std::vector<std::byte> bytes(bundle.bytes().begin(), bundle.bytes().end());
+  std::byte* vertices = bytes.data() + (bundle.vertices().data() - bundle.bytes().data());
+  for (std::uint32_t g = 0; g < bundle.chunk_groups(); ++g) {
+    const ChunkGroup group = bundle.chunk_group(g);
+    const std::uint32_t layout = bundle.models()[group.model].layout;
+    const std::uint32_t offset = occlusion_byte(bundle.occlusion(), layout);
+    if (offset == kNone) continue;
+    const std::size_t stride = bundle.layouts()[layout].stride;
+    for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle.chunks()[group.first_chunk + c];
+      for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
+        const LevelRecord& level = bundle.levels()[chunk.first_level + l];
+        for (std::size_t v = 0; v < level.vertex_count; ++v) {
+          vertices[level.vertex_offset + v * stride + offset] = kAllLight;
+        }
+      }
+    }
+  }
+  return bytes;
+}
+
 class Looker {
  public:
   Looker(const BundleView& bundle, const VisualOptions& options, const IssueSink& sink)
-      : bundle_(bundle), options_(options), sink_(sink) {
+      : bundle_(bundle), options_(options), sink_(sink), plain_bytes_(without_occlusion(bundle)) {
     render_.clear_colour = {0.5f, 0.5f, 0.5f, 1.0f};
     clear_ = {128, 128, 128};
     camera_ = default_camera(options.side, options.side);
@@ -77,9 +103,11 @@ class Looker {
 
   Result<void> set_up() {
     MODAR_ASSIGN(context_, GlContext::create_offscreen());
+    MODAR_ASSIGN(const BundleView plain, BundleView::open(plain_bytes_));
     MODAR_ASSIGN(renderer_, Renderer::create(bundle_, probe_gl_caps()));
-    renderer_->set_options(render_);
-    return renderer_->resize(options_.side, options_.side);
+    MODAR_ASSIGN(plain_renderer_, Renderer::create(plain, probe_gl_caps()));
+    plain_renderer_->set_options(render_);
+    return plain_renderer_->resize(options_.side, options_.side);
   }
 
   Result<ModelLook> look(std::uint32_t index, const std::string& path) {
@@ -104,9 +132,6 @@ class Looker {
       MODAR_TRY(write_png(worst_, look.picture));
     }
     MODAR_ASSIGN(look.levels, look_at_levels(bundle_, *renderer_, index, {}));
-    // Those were drawn in other sizes and by other errors.
-    renderer_->set_options(render_);
-    MODAR_TRY(renderer_->resize(options_.side, options_.side));
     judge(index, look);
     return look;
   }
@@ -154,12 +179,12 @@ class Looker {
   RgbaImage draw(std::uint32_t index, const glm::dmat4& to_eye) {
     const DrawItem item{index, glm::mat4(to_eye)};
     const DepthRange range = depth_range(bundle_, {&item, 1});
-    renderer_->render(RgbImage{}, gl_projection(camera_, range.near_plane, range.far_plane),
-                      {&item, 1});
+    plain_renderer_->render(RgbImage{}, gl_projection(camera_, range.near_plane, range.far_plane),
+                            {&item, 1});
     RgbaImage image{
         static_cast<std::uint32_t>(options_.side), static_cast<std::uint32_t>(options_.side), {}};
     image.pixels.resize(4 * std::size_t{image.width} * image.height);
-    renderer_->read_pixels(image.pixels);
+    plain_renderer_->read_pixels(image.pixels);
     return image;
   }
 
@@ -185,6 +210,8 @@ class Looker {
   Camera camera_;
   std::unique_ptr<GlContext> context_;
   std::unique_ptr<Renderer> renderer_;
+  std::vector<std::byte> plain_bytes_;        ///< as the reference is lit
+  std::unique_ptr<Renderer> plain_renderer_;  ///< of these
   RgbaImage worst_;
 };
 

@@ -50,8 +50,9 @@ double mean_delta_e(const RgbaImage& a, const RgbaImage& b,
                     const std::array<std::uint8_t, 3>& clear);
 
 /// Renders sources in double precision from uncompressed pictures and the bundle by the real
-/// renderer, off-screen. Models whose source is not there are left out. Reports VISUAL_DIFFERS.
-/// Errors: those of reading sources; kUnsupported "gl.*"; kIo where a picture cannot be written.
+/// renderer, off-screen, without its occlusion. Models whose source is not there are left out.
+/// Reports VISUAL_DIFFERS. Errors: those of reading sources; kUnsupported "gl.*"; kIo where a
+/// picture cannot be written.
 Result<std::vector<ModelLook>> check_looks(const BundleView& bundle, const VisualOptions& options,
                                            const IssueSink& sink);
 
