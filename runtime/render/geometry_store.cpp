@@ -60,7 +60,10 @@ void GeometryStore::collect_ranges() {
     for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
       const ChunkRecord& chunk = bundle_.chunks()[group.first_chunk + c];
       for (std::uint32_t i = 0; i < chunk.level_count; ++i) {
-        vertex_ranges_[chunk.first_level + i].layout = bundle_.models()[group.model].layout;
+        Range& vertices = vertex_ranges_[chunk.first_level + i];
+        vertices.layout = bundle_.models()[group.model].layout;
+        if (g < bundle_.models().size()) continue;
+        vertices.rank = index_ranges_[chunk.first_level + i].rank = kStandIn;
       }
     }
   }
@@ -372,14 +375,15 @@ bool GeometryStore::make_resident(Range& range, GlState& gl) {
   return true;
 }
 
-/// Deletes the ranges that were used longest ago until `bytes` fit; nothing of this frame.
+/// Deletes the ranges that were used longest ago until `bytes` fit, stand-ins last: where one chunk
+/// of a view is missing, a stand-in is what is seen. Nothing of this frame.
 bool GeometryStore::evict(std::uint64_t bytes, GlState& gl) {
   while (resident_bytes_ + bytes > budget_) {
     Range* oldest = nullptr;
     for (std::vector<Range>* ranges : {&vertex_ranges_, &index_ranges_}) {
       for (Range& range : *ranges) {
         if (range.buffer == 0 || range.last_used >= frame_) continue;
-        if (oldest == nullptr || range.last_used < oldest->last_used) oldest = &range;
+        if (oldest == nullptr || range.age() < oldest->age()) oldest = &range;
       }
     }
     if (oldest == nullptr) return false;

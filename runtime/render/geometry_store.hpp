@@ -88,8 +88,12 @@ class GeometryStore {
     GLuint buffer = 0;
     std::uint64_t last_used = 0;  ///< frame; kOpen: bytes of it still come
     bool kept = false;            ///< in the bundle's bytes, all of it
+    std::uint64_t rank = 0;       ///< kStandIn: makes room after all others
+
+    [[nodiscard]] std::uint64_t age() const { return last_used + rank; }
   };
 
+  static constexpr std::uint64_t kStandIn = std::uint64_t{1} << 62;
   /// Later than all frames, so that it is not evicted.
   static constexpr std::uint64_t kOpen = ~std::uint64_t{0};
 

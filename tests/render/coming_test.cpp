@@ -41,11 +41,12 @@ std::vector<std::byte> blocks_of(std::uint32_t side, unsigned seed) {
 void make_stand_in(BundleContent& content, float error) {
   content.models.pop_back();
   const auto model = static_cast<std::uint32_t>(content.models.size() - 1);
-  content.stand_ins.push_back({model, 0, 1, 0});
+  const auto number = static_cast<std::uint32_t>(content.stand_ins.size());
+  content.stand_ins.push_back({model, number, 1, 0});
   content.stand_in_chunks.push_back(content.chunks.back());
   content.stand_in_levels.push_back(content.levels.back());
-  content.stand_in_chunks[0].first_level = 0;
-  content.stand_in_levels[0].error = error;
+  content.stand_in_chunks.back().first_level = number;
+  content.stand_in_levels.back().error = error;
   content.chunks.pop_back();
   content.levels.pop_back();
 }
@@ -353,6 +354,49 @@ TEST_F(WantedTest, NeedsAContextThatDrawsTexturesInPart) {
   const auto refused = Renderer::create_part(memory->view, caps, Renderer::Part::kWanted);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, "gl.levels");
+}
+
+/// Of a view that needs all of a budget, the next one shows a stand-in, not the coarsest there is.
+TEST_F(WantedTest, StandInsMakeRoomLast) {
+  SceneMaker maker;
+  const std::uint32_t material = maker.add_material(flat_material());
+  const std::uint32_t layout = maker.add_layout(Layout::kHalfColoured);
+  const auto add = [&](std::size_t squares, const Rgb& tint) {
+    const glm::dvec3 a(-0.5, -0.5, 0), b(0.5, -0.5, 0), c(0.5, 0.5, 0), d(-0.5, 0.5, 0);
+    std::vector<Triangle> all;
+    for (std::size_t i = 0; i < squares; ++i) {
+      all.push_back({{a, b, c}, {}, tint});
+      all.push_back({{a, c, d}, {}, tint});
+    }
+    maker.add_model(layout, {{{all}, {}, material, {}}});
+  };
+  add(64, {255, 0, 0});
+  add(16, {0, 255, 0});
+  make_stand_in(maker.content, 2.0f);
+  add(1, {0, 0, 255});
+  make_stand_in(maker.content, 5.0f);
+  add(64, {255, 255, 255});
+  hold(maker.content);
+  const std::uint64_t square = 6ull * memory->view.layouts()[0].stride + 6ull * 2;
+  const auto renderer = start(112 * square);
+  ASSERT_TRUE(renderer);
+  renderer->set_options(flat_light());
+  const auto seen = [&](std::uint32_t model) {
+    const DrawItem item{model, glm::translate(glm::mat4(1.0f), {0.0f, 0.0f, -2.0f})};
+    const auto pixels = draw(*renderer, default_camera(96, 72), std::span(&item, 1));
+    const std::size_t middle = 4 * (36 * 96 + 48);
+    return std::array<int, 3>{pixels[middle], pixels[middle + 1], pixels[middle + 2]};
+  };
+  using Colour = std::array<int, 3>;
+  EXPECT_EQ(seen(0), (Colour{0, 0, 255}));
+  bring(*renderer);
+  EXPECT_EQ(seen(0), (Colour{0, 255, 0}));
+  bring(*renderer);
+  EXPECT_EQ(seen(0), (Colour{255, 0, 0}));
+  seen(1);
+  bring(*renderer);
+  EXPECT_EQ(seen(1), (Colour{255, 255, 255}));
+  EXPECT_EQ(seen(0), (Colour{0, 255, 0})) << "the chunk has made room";
 }
 
 }  // namespace
