@@ -474,11 +474,10 @@ void print_confusion(const Confusion& confusion) {
     }
     std::printf("\n");
   }
+  const char* advice =
+      confusion.together == 0 ? "bake into one bundle, where they are told apart" : "keep apart";
   for (const auto& [a, b] : confusion.keep_apart()) {
-    const bool told_apart = confusion.together == 0;
-    std::printf("%s: %s and %s\n",
-                told_apart ? "bake into one bundle, where they are told apart" : "keep apart",
-                confusion.names[a].c_str(), confusion.names[b].c_str());
+    std::printf("%s: %s and %s\n", advice, confusion.names[a].c_str(), confusion.names[b].c_str());
   }
   for (std::size_t i = 0; i < count; ++i) {
     if (confusion.mirrored[i] == 0) continue;

@@ -8,17 +8,12 @@
 
 #include "bake/image/image.hpp"
 #include "bake/import/read_model.hpp"
+#include "formats/base/utf8.hpp"
 
 namespace modar {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string lower(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return out;
-}
 
 /// The first in byte order, so that the result does not depend on the file system's; empty: none.
 fs::path texture_beside(const std::string& model, const fs::path& folder) {
@@ -40,9 +35,10 @@ bool is_texture_name(std::string_view picture, std::string_view model) {
                                          "col",     "color",     "colour",     "diff",
                                          "diffuse", "tex",       "texture"};
   if (model.empty() || picture.size() <= model.size() + 1) return false;
-  if (lower(picture.substr(0, model.size())) != lower(model)) return false;
-  if (std::string_view("_- .").find(picture[model.size()]) == std::string_view::npos) return false;
-  const std::string word = lower(picture.substr(model.size() + 1));
+  const std::string name = ascii_lower(std::string(picture));
+  if (!name.starts_with(ascii_lower(std::string(model)))) return false;
+  if (std::string_view("_- .").find(name[model.size()]) == std::string_view::npos) return false;
+  const std::string_view word = std::string_view(name).substr(model.size() + 1);
   return std::find(std::begin(kWords), std::end(kWords), word) != std::end(kWords);
 }
 
@@ -62,8 +58,7 @@ void take_texture_by_name(const std::string& folder, const std::string& label, S
     material.diffuse_map = texture.string();
   }
   model.diagnostics.push_back({"model.texture-by-name", DiagnosticSeverity::kInfo, label, 0,
-                               "'" + texture.filename().string() + "' is used as the texture",
-                               "name it in a material file"});
+                               "'" + texture.filename().string() + "' is used as the texture", ""});
 }
 
 }  // namespace modar

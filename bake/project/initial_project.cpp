@@ -14,16 +14,12 @@
 #include "bake/options/options.hpp"
 #include "bake/process/process.hpp"
 #include "bake/project/project.hpp"
+#include "formats/base/utf8.hpp"
 
 namespace modar {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string lower(std::string text) {
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return text;
-}
 
 bool one_of(const std::string& extension, std::initializer_list<const char*> list) {
   return std::any_of(list.begin(), list.end(), [&](const char* one) { return extension == one; });
@@ -46,7 +42,7 @@ bool left_out(const fs::path& name) {
 constexpr std::size_t kMostMaterialBytes = std::size_t{64} << 20;
 
 std::string text_of(const fs::path& path) {
-  return lower(read_file(path.string(), kMostMaterialBytes).value_or(""));
+  return ascii_lower(read_file(path.string(), kMostMaterialBytes).value_or(""));
 }
 
 Result<Found> look_through(const std::string& folder) {
@@ -66,7 +62,7 @@ Result<Found> look_through(const std::string& folder) {
     }
     if (!it->is_regular_file(error)) continue;
     const fs::path relative = it->path().lexically_relative(folder);
-    const std::string extension = lower(relative.extension().string());
+    const std::string extension = ascii_lower(relative.extension().string());
     if (is_model_file(relative.string())) found.models.push_back(relative);
     if (one_of(extension, {".fbx", ".dae", ".blend", ".3ds",  ".usdz", ".usd",  ".max",
                            ".c4d", ".ma",  ".mb",    ".skp",  ".stp",  ".step", ".las",
@@ -85,7 +81,8 @@ Result<Found> look_through(const std::string& folder) {
       return model.parent_path() == picture.parent_path() &&
              is_texture_name(picture.stem().string(), model.stem().string());
     };
-    return found.material_text.find(lower(picture.filename().string())) != std::string::npos ||
+    return found.material_text.find(ascii_lower(picture.filename().string())) !=
+               std::string::npos ||
            std::any_of(found.models.begin(), found.models.end(), is_of);
   });
   return found;

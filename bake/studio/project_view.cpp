@@ -11,6 +11,7 @@
 #include "bake/studio/look.hpp"
 #include "bake/studio/session.hpp"
 #include "bake/studio/upload.hpp"
+#include "formats/base/utf8.hpp"
 #include "modar/device_profile.hpp"
 
 namespace modar {
@@ -19,11 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostFiles = 20'000;  // that are listed
-
-std::string lower(std::string text) {
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return text;
-}
 
 std::uint64_t bytes_of(const std::string& path) {
   std::error_code error;
@@ -34,7 +30,7 @@ std::uint64_t bytes_of(const std::string& path) {
 }  // namespace
 
 const char* file_kind(const std::string& file) {
-  const std::string extension = lower(fs::path(file).extension().string());
+  const std::string extension = ascii_lower(fs::path(file).extension().string());
   if (is_picture_file(file)) return "photo";
   for (const char* video : {".mp4", ".mov", ".webm", ".mkv", ".avi", ".m4v"}) {
     if (extension == video) return "video";

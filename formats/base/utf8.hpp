@@ -67,4 +67,10 @@ inline void append_utf8(std::string& text, std::uint32_t code_point) {
   }
 }
 
+/// A to Z as small letters, whatever the locale; all other bytes stay.
+inline std::string ascii_lower(std::string text) {
+  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return text;
+}
+
 }  // namespace modar

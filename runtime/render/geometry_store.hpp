@@ -93,6 +93,7 @@ class GeometryStore {
     [[nodiscard]] std::uint64_t age() const { return last_used + rank; }
   };
 
+  /// More than all frames.
   static constexpr std::uint64_t kStandIn = std::uint64_t{1} << 62;
   /// Later than all frames, so that it is not evicted.
   static constexpr std::uint64_t kOpen = ~std::uint64_t{0};

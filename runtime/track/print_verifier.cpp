@@ -96,7 +96,9 @@ glm::vec3 direction_of(const Pose& pose) {
       evidence_(patterns.size()),
       relations_(patterns.size() * patterns.size()),
       mirrors_(patterns.size(), {Mirror{true}, Mirror{false}}) {
-  for (const TrackedPattern& pattern : patterns) regular_.push_back(regular(pattern) ? 1 : 0);
+  for (const TrackedPattern& pattern : patterns) {
+    regular_.push_back(pattern.surface.flat() && regular(pattern) ? 1 : 0);
+  }
 }
 
 /// kFlip bits of a cell. If the mirror image of the cell is inside the outline, pattern and mirror

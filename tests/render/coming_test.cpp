@@ -356,7 +356,7 @@ TEST_F(WantedTest, NeedsAContextThatDrawsTexturesInPart) {
   EXPECT_EQ(refused.error().code, "gl.levels");
 }
 
-/// Of a view that needs all of a budget, the next one shows a stand-in, not the coarsest there is.
+/// After a view that fills the budget, a model is drawn by its finer stand-in, not by the coarsest.
 TEST_F(WantedTest, StandInsMakeRoomLast) {
   SceneMaker maker;
   const std::uint32_t material = maker.add_material(flat_material());
@@ -378,6 +378,7 @@ TEST_F(WantedTest, StandInsMakeRoomLast) {
   add(64, {255, 255, 255});
   hold(maker.content);
   const std::uint64_t square = 6ull * memory->view.layouts()[0].stride + 6ull * 2;
+  // Room for a chunk and both stand-ins, not for two chunks.
   const auto renderer = start(112 * square);
   ASSERT_TRUE(renderer);
   renderer->set_options(flat_light());

@@ -18,6 +18,7 @@
 #include "bake/import/texture_by_name.hpp"
 #include "bake/io/input.hpp"
 #include "formats/base/colour.hpp"
+#include "formats/base/utf8.hpp"
 
 namespace modar {
 namespace {
@@ -31,13 +32,8 @@ bool is_file(const fs::path& path) {
   return fs::is_regular_file(path, error) && !error;
 }
 
-char lower(char c) {
-  return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-}
-
 bool same_but_case(std::string_view a, std::string_view b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](char x, char y) { return lower(x) == lower(y); });
+  return a.size() == b.size() && ascii_lower(std::string(a)) == ascii_lower(std::string(b));
 }
 
 /// The entry of `folder` named `name` in any case: the exact match if there is one, else the first
