@@ -3,9 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Core>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -345,17 +344,29 @@ double corner_distance(const std::array<glm::dvec2, 4>& a, const std::array<glm:
 namespace modar {
 
 void solve_symmetric(int n, int columns, const double* a, double* x) {
-  // Padded to 8 x 8 by the identity, which leaves the other unknowns unchanged.
-  using Square = Eigen::Matrix<double, 8, 8>;
-  using Column = Eigen::Matrix<double, 8, 1>;
-  Square padded = Square::Identity();
-  padded.topLeftCorner(n, n) = Eigen::Map<const Eigen::MatrixXd>(a, n, n);
-  const Eigen::LDLT<Square> solver(padded);
-  for (int k = 0; k < columns; ++k) {
-    Eigen::Map<Eigen::VectorXd> column(x + k * n, n);
-    Column right = Column::Zero();
-    right.head(n) = column;
-    column = Column(solver.solve(right)).head(n);
+  // a = l * diag(d) * transposed l, l with ones on its diagonal; ld = l * diag(d).
+  double l[8][8];
+  double ld[8][8];
+  double inverse[8];  // of d; 0 where the unknown is not determined, which is then 0
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      double sum = a[j * n + i];
+      for (int k = 0; k < j; ++k) sum -= ld[i][k] * l[j][k];
+      ld[i][j] = sum;
+      l[i][j] = j < i ? sum * inverse[j] : 1.0;
+    }
+    const double d = ld[i][i];
+    // NaN where d is infinite, as where it is NaN.
+    inverse[i] = std::abs(d) <= std::numeric_limits<double>::min() ? 0.0 : 1.0 / d + 0.0 * d;
+  }
+  for (double* column = x; column != x + columns * n; column += n) {
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k < i; ++k) column[i] -= l[i][k] * column[k];
+    }
+    for (int i = n - 1; i >= 0; --i) {
+      column[i] *= inverse[i];
+      for (int k = i + 1; k < n; ++k) column[i] -= l[k][i] * column[k];
+    }
   }
 }
 
