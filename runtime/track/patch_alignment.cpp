@@ -614,20 +614,6 @@ double step_pose(const TrackedPattern& pattern, const FrameView& frame, const Pa
   return moved;
 }
 
-/// See PatchFit::unrest; each patch counts as two pixels at most.
-double unrest_of(std::span<const PatchLinearisation> patches) {
-  constexpr float kMost = 2.0f;
-  double sum = 0.0;
-  int count = 0;
-  for (const PatchLinearisation& patch : patches) {
-    if (patch.equations.correlation < kInlierCorrelation) continue;
-    const glm::vec2 d = displacement(patch.equations);
-    sum += static_cast<double>(std::min(kMost * kMost, glm::dot(d, d)));
-    ++count;
-  }
-  return count > 0 ? std::sqrt(sum / count) : 0.0;
-}
-
 /// The normal equations of a pose and of its pattern's shape, lower triangle.
 struct PlaneEquations {
   double jtj[8][8] = {};
@@ -702,6 +688,19 @@ bool solve(const PlaneEquations& sum, std::array<double, 6>& step, PlaneChange& 
 }
 
 }  // namespace
+
+double unrest_of(std::span<const PatchLinearisation> patches) {
+  constexpr float kMost = 2.0f;
+  double sum = 0.0;
+  int count = 0;
+  for (const PatchLinearisation& patch : patches) {
+    if (patch.equations.correlation < kInlierCorrelation) continue;
+    const glm::vec2 d = displacement(patch.equations);
+    sum += static_cast<double>(std::min(kMost * kMost, glm::dot(d, d)));
+    ++count;
+  }
+  return count > 0 ? std::sqrt(sum / count) : 0.0;
+}
 
 glm::dmat2 PlaneChange::shape_after(const glm::dmat2& before, double share) const {
   const double a = share * shape[0];

@@ -173,6 +173,9 @@ struct PatchFit {
 PatchFit align(const TrackedPattern& pattern, const FrameView& frame, int frame_level, int steps,
                bool precise, Pose& pose);
 
+/// See PatchFit::unrest; each patch counts as two pixels at most.
+double unrest_of(std::span<const PatchLinearisation> patches);
+
 /// How the patches fit at a pose, without moving it.
 PatchFit evaluate(const TrackedPattern& pattern, const FrameView& frame, int frame_level,
                   const Pose& pose);

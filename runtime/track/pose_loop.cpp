@@ -60,7 +60,7 @@ struct PoseLoop::State {
   void accept(TrackResult& result);
   bool start_track(const TrackedPattern& pattern, Track& track, const DetectionCandidate& candidate,
                    Detection& detection) const;
-  void measure(std::size_t i, Detection& detection);
+  bool measure(std::size_t i, Detection& detection);
   [[nodiscard]] bool has_slipped(std::size_t i, const Track& track) const;
   bool resolve_overlap(std::size_t i, const Detection& detection, TrackResult& result);
   bool show(std::size_t i, const PrintVerifier::Verification& verification, Detection& detection,
@@ -197,14 +197,14 @@ void PoseLoop::State::track_all(TrackResult& result) {
       track.tracked = track.has_motion = false;
       track.last_reason = Reason::kLostByBlur;
     }
-    if (track.tracked && calibration == nullptr && track.restless > kMostRestless) {
+    const bool restless = calibration == nullptr && track.restless > kMostRestless;
+    if (track.tracked && (restless || !measure(i, detection))) {
       track.tracked = track.has_motion = false;
       track.last_reason = Reason::kFailedVerification;
     }
     if (track.tracked && track.doubts > 0) {
       track.shown_reason = Reason::kLostByBlur;
     } else if (track.tracked) {
-      measure(i, detection);
       const auto frame = frame_tracker.frame();
       show(i,
            track.verified ? print_verifier->verify_tracked(i, frame, track)
@@ -217,8 +217,8 @@ void PoseLoop::State::track_all(TrackResult& result) {
   }
 }
 
-void PoseLoop::State::measure(std::size_t i, Detection& detection) {
-  if (calibration != nullptr) calibration->measure(i, detection);
+bool PoseLoop::State::measure(std::size_t i, Detection& detection) {
+  return calibration == nullptr || calibration->measure(i, detection);
 }
 
 bool PoseLoop::State::has_slipped(std::size_t i, const Track& track) const {
@@ -352,18 +352,18 @@ void PoseLoop::State::accept(TrackResult& result) {
     if (calibration != nullptr) calibration->forget_plane(i);
     bool here = candidate.reason == Reason::kVisible &&
                 start_track(patterns[i], track, candidate, detection);
-    if (here && before.verified && before.frames_since_lost < kRemembered &&
-        print_verifier->has_slipped(i, frame_tracker.frame(), track)) {
-      here = false;
-      track = before;
+    if (here) {
+      track.verified = search->verifies_finds();
+      const bool slipped = before.verified && before.frames_since_lost < kRemembered &&
+                           print_verifier->has_slipped(i, frame_tracker.frame(), track);
+      here = !slipped && (!track.verified || measure(i, detection));
+      if (!here) track = before;
     }
     Reason reason =
         candidate.reason == Reason::kVisible ? Reason::kFailedVerification : candidate.reason;
     if (here) {
       track.again = before.frames_since_lost < tracker::kRecentFrames;
       PrintVerifier::Verification verification;
-      track.verified = search->verifies_finds();
-      if (track.verified) measure(i, detection);
       if (track.verified)
         verification = print_verifier->verify_found(i, frame_tracker.frame(), track, track.again);
       track.shown_reason = verification.reason;

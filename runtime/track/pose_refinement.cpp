@@ -136,6 +136,9 @@ bool refine_plane(TrackedPattern& pattern, const FrameView& frame, Pose& pose, P
   if (!fit.open()) {
     fit = align_plane(plane, frame, best.frame_level, kCoveredSteps, kMaxPatches, next, change);
   }
+  if (pattern.surface.flat() && fit.inlier_ratio() < kLittleShown) {
+    fit.unrest = unrest_of(frame.patches.last_linearisations());
+  }
   if (!fit.good()) return false;
   pattern.shape = plane.shape;
   pose = next;

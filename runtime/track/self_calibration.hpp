@@ -31,7 +31,8 @@ class SelfCalibration {
   bool apply();
   /// Measures a tracked flat pattern's free homography: what it says of the camera, and what a pose
   /// leaves of it, since no camera explains the pictures of a stabilised or distorting one.
-  void measure(std::size_t i, Detection& detection);
+  /// False where it is found anew and its patches contradict each other on any plane.
+  bool measure(std::size_t i, Detection& detection);
   /// A pattern is found anew, by the aspect alone: forgets what its last track's pose left of it.
   void forget_plane(std::size_t i) {
     if (patterns_[i].surface.flat()) patterns_[i].shape = {1.0, 0.0, 0.0, aspect(i)};
@@ -44,7 +45,7 @@ class SelfCalibration {
  private:
   bool view_plane(const TrackedPattern& plane, const Pose& pose, CameraEstimator::View& view,
                   PlaneSplit& split) const;
-  bool measure_first(std::size_t i, CameraEstimator::View& view, bool& open);
+  bool measure_first(std::size_t i, CameraEstimator::View& view, bool& open, bool& restless);
   bool measure_again(std::size_t i, CameraEstimator::View& view);
 
   Camera& camera_;

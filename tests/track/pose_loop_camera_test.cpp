@@ -29,8 +29,8 @@ struct Played {
   Reason last_reason = Reason::kVisible;
 };
 
-/// Something before the left part of a print.
-void cover(const SceneFrame& scene, double share, GrayPicture& picture) {
+/// Something, another for each seed, before the left part of a print.
+void cover(const SceneFrame& scene, double share, std::uint32_t seed, GrayPicture& picture) {
   const auto& c = scene.corners;
   std::vector<cv::Point> outline;
   for (const glm::dvec2 at : {c[0], glm::mix(c[0], c[1], share), glm::mix(c[3], c[2], share), c[3]})
@@ -38,7 +38,7 @@ void cover(const SceneFrame& scene, double share, GrayPicture& picture) {
   cv::Mat pixels(picture.height, picture.width, CV_8U, picture.pixels.data());
   cv::Mat mask(pixels.size(), CV_8U, cv::Scalar(0));
   cv::fillConvexPoly(mask, outline, cv::Scalar(255));
-  const GrayPicture hand = clutter(picture.width, picture.height, 78);
+  const GrayPicture hand = clutter(picture.width, picture.height, seed);
   cv::Mat(hand.height, hand.width, CV_8U, const_cast<std::uint8_t*>(hand.pixels.data()))
       .copyTo(pixels, mask);
 }
@@ -55,7 +55,7 @@ Detection drawn(const Detection& one, const Camera& camera, const glm::dmat4x3& 
 }
 
 Played play(const Camera& lens, double aspect, int frames, bool estimate, double tilt = 35,
-            double covered = 0) {
+            double covered = 0, std::uint32_t cover_seed = 78) {
   PoseLoopOptions options;
   options.estimate_camera = estimate;
   cv::Mat print;
@@ -75,7 +75,7 @@ Played play(const Camera& lens, double aspect, int frames, bool estimate, double
     Random same_side(5);
     SceneFrame scene = render_still(printed.view(), lens, path.at(i / 30.0, 1), background, band,
                                     same_side, 0.65, {});
-    if (covered > 0) cover(scene, covered, scene.picture);
+    if (covered > 0) cover(scene, covered, cover_seed, scene.picture);
     expose(scene.picture, {}, random, scene.picture);
     EXPECT_TRUE((*loop)->step(scene.picture.view(), seen));
     out.shown += seen.visible.empty() ? 0 : 1;
@@ -165,6 +165,18 @@ TEST(UnknownCamera, CornersOfAMostlyCoveredPrintLieRightInItsFirstFrame) {
     }
   }
   EXPECT_GE(shown, 14);
+}
+
+// Chance patches on what covers a print hold some finds 80 to 140 pixels beside its place.
+TEST(UnknownCamera, AFindWhosePatchesContradictEachOtherIsNotShown) {
+  int shown = 0;
+  for (std::uint32_t seed = 100; seed < 112; ++seed) {
+    const Camera lens = lens_of(640, 480, 640 * (0.7 + 0.1 * (seed % 6)));
+    const Played one = play(lens, 1.03, 1, true, 10.0 * (seed % 5), 0.65, seed);
+    shown += one.shown;
+    EXPECT_LT(one.worst, 3.0) << seed;
+  }
+  EXPECT_GE(shown, 10);
 }
 
 TEST(UnknownCamera, TheFocalLengthIsFoundWithItsSpread) {
