@@ -125,7 +125,7 @@ else
 fi
 step "sources" eval 'git archive --format=tar --prefix="modar-$version/" HEAD | gzip -9n >"$out/modar-$version.tar.gz"'
 if [ -n "${ANDROID_NDK:-}" ]; then
-  step "packages for the app" scripts/setup.sh test
+  step "packages for the app" scripts/setup.sh android
   step "a bundle for the app" "$work/one/build/package/bin/modar" bake --model assets/models/pottery.obj \
     --pattern assets/patterns/cover.png:210mm --scene cover=pottery,scale=0.5 -o "$work/demo.modar"
   step "app" app

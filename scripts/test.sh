@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Builds with ASan + UBSan and runs the tests under CTest.
 #   scripts/test.sh           installs the build's packages only; names what it skips
-#   scripts/test.sh --all     installs every oracle and tool, runs slow tests, too, and finds uses of variables after their
-#                             scope as well; names what is still skipped (CI runs this, in a bare Debian 12)
+#   scripts/test.sh --ci      installs the oracles, too; CI runs this, in a bare Debian 12
+#   scripts/test.sh --all     installs every tool, so that pages run in browsers and the app in a JVM, takes slow tests, too,
+#                             and finds uses of variables after their scope as well
 #   scripts/test.sh --soak    runs the tests with the label soak at full length: a million mutations, 10,000 frames (minutes)
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -14,9 +15,10 @@ scopes=OFF
 export MODAR_SOAK=0
 case ${1:-} in
   "") ;;
-  --all) packages=(test web); scopes=ON; MODAR_SOAK=1 ;;
+  --ci) packages=(test) ;;
+  --all) packages=(test web android); scopes=ON; MODAR_SOAK=1 ;;
   --soak) packages=(test); MODAR_SOAK=full; tests=(-L soak) ;;
-  -h | --help) sed -n '2,6s/^# \{0,1\}//p' "$0"; exit 0 ;;
+  -h | --help) sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 0 ;;
   *) echo "test.sh: unknown option '$1'; try --help" >&2; exit 1 ;;
 esac
 
@@ -44,7 +46,7 @@ log=build/dev/Testing/Temporary/LastTest.log
 status=0
 ctest --preset dev -j "$jobs" --no-tests=error "${tests[@]}" || status=$?
 echo
-echo "Skipped (see scripts/packages-test.txt and CONTRIBUTING.md):"
+echo "Skipped (see scripts/packages-*.txt and CONTRIBUTING.md):"
 { cat build/dev/skipped.txt
   sed -nE "s/^(test_[A-Za-z0-9_]+ .*) \.\.\. skipped (.*)/\1: \2/p; s/^\[  SKIPPED \] ([A-Za-z0-9_./]+) \([0-9]+ ms\)$/\1/p" "$log"
 } | sort -u | sed 's/^/  /' | grep . || echo "  nothing"
