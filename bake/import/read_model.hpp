@@ -22,6 +22,12 @@ bool is_model_file(const std::string& path);
 /// a picture is the texture of a model that names no material file.
 bool is_texture_name(std::string_view picture, std::string_view model);
 
+/// The existing regular file that `name` in a model refers to, looked up in `folder` (absolute
+/// names are tried as they are, too); empty where there is none. Tried in this order: as written;
+/// without quotes and escapes, backslashes as slashes; with any case; the bare file name in
+/// `folder`, with any case.
+std::string find_named_file(std::string_view name, const std::string& folder);
+
 /// The same as an error. Errors: kUnsupported
 /// "model.format", whose cure converts what it is.
 Result<void> require_model_format(const std::string& path);

@@ -19,6 +19,7 @@
 #include "bake/json.hpp"
 #include "bake/pattern/alike_patterns.hpp"
 #include "bake/project/file_digests.hpp"
+#include "bake/project/folder_names.hpp"
 #include "bake/project/interrupts.hpp"
 #include "bake/project/part_cache.hpp"
 #include "bake/project/project.hpp"
@@ -47,6 +48,7 @@ struct Task {
   std::string tier;
   Settings settings;               ///< that concern it
   std::vector<Input> inputs;       ///< its own file first; the others only where they are known
+  std::set<std::string> textures;  ///< pictures beside a model, that are its texture by their names
   std::string action;              ///< digest of its own file, settings and program
   std::optional<std::string> key;  ///< digest of all inputs; nothing: they are not known yet
   AssetOutcome::State state = AssetOutcome::State::kFresh;
@@ -155,8 +157,7 @@ class ProjectBake {
 
   /// Path of a file that an asset names: relative to the asset's own folder.
   [[nodiscard]] std::string beside(const Task& task, const std::string& file) const {
-    if (file.starts_with('/')) return file;
-    return (fs::path(project_.path(task.asset->file)).parent_path() / file).string();
+    return names_.located(fs::path(project_.path(task.asset->file)).parent_path().string(), file);
   }
 
   /// Pictures stand alone; models and image targets name other files.
@@ -188,6 +189,7 @@ class ProjectBake {
     task.action = digest_of(std::string(task.asset->pattern ? "pattern" : "model") + "\n" +
                             program_ + "\n" + task.inputs[0].path + "\n" + task.inputs[0].digest +
                             "\n" + size_of(*task.asset) + "\n" + joined(task.settings));
+    if (!task.asset->pattern) task.textures = names_.textures_of(file);
     const auto files =
         names_files(*task.asset) ? cache_.files_of(task.action) : std::vector<std::string>();
     if (files) take_inputs(task, *files);
@@ -197,8 +199,10 @@ class ProjectBake {
   }
 
   void take_inputs(Task& task, const std::vector<std::string>& files) {
+    std::set<std::string> named = task.textures;
+    named.insert(files.begin(), files.end());
     task.inputs.resize(1);
-    for (const std::string& file : files) {
+    for (const std::string& file : named) {
       task.inputs.push_back({file, digests_.of(beside(task, file))});
     }
     task.key = key_of(task);
@@ -215,9 +219,11 @@ class ProjectBake {
     if (text("settings") != joined(task.settings) || text("width") != size_of(*task.asset)) {
       return "its settings in " + fs::path(project_.file).filename().string() + " changed";
     }
+    std::set<std::string> come = task.textures;
     const Json files = before->find("files").value_or(Json());
     for (std::size_t i = 0; i + 1 < files.size(); i += 2) {
       const std::string file = files.at(i)->text().value_or("");
+      come.erase(file);
       const std::string digest = files.at(i + 1)->text().value_or("");
       const std::string path = i == 0 ? project_.path(task.asset->file) : beside(task, file);
       const std::string now = digests_.of(path);
@@ -226,6 +232,7 @@ class ProjectBake {
                      : digest == kNoFile ? " is there now"
                                          : " changed");
     }
+    if (!come.empty()) return beside(task, *come.begin()) + " is there now";
     return "it is not in the cache";
   }
 
@@ -752,6 +759,7 @@ class ProjectBake {
   PartCache cache_;
   const ProgressCallback& progress_;
   mutable FileDigests digests_;
+  mutable FolderNames names_;
   std::string program_;  ///< version and digest of this very program
   std::vector<Task> tasks_;
   std::vector<Target> targets_;

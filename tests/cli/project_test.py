@@ -261,6 +261,24 @@ class Again(ProjectTest):
         self.assertEqual(self.reasons(), {"a": "models/wall.png is there now"})
         self.assertNotIn("mtl.missing-map", self.findings(self.bake()))
 
+    def test_a_missing_file_is_noticed_under_the_names_that_the_reader_takes(self):
+        wall = (self.place / "models/wall.png").read_bytes()
+        (self.place / "models/wall.png").unlink()
+        (self.place / "models/cube.mtl").write_text(CUBE_MTL.replace("wall.png", "C:\\Users\\Ann\\Wall.PNG"))
+        self.assertIn("mtl.missing-map", self.findings(self.bake()))
+        (self.place / "models/wall.png").write_bytes(wall)
+        self.assertEqual(self.reasons(), {"a": "models/wall.png is there now"})
+        self.assertNotIn("mtl.missing-map", self.findings(self.bake()))
+        self.assertEqual({asset["state"] for asset in self.bake()["assets"]}, {"fresh"})
+        # "b" names no material file: pictures are its texture by their names, and b.mtl is its material file.
+        for name in ("b_albedo.png", "B.mtl"):
+            (self.place / "models" / name).write_bytes(wall if name.endswith("png") else CUBE_MTL.encode())
+            self.assertEqual(self.reasons(), {"b": f"models/{name} is there now"})
+            self.bake()
+            self.assertEqual({asset["state"] for asset in self.bake()["assets"]}, {"fresh"})
+        (self.place / "models/b_albedo.png").unlink()
+        self.assertEqual(self.reasons(), {"b": "models/b_albedo.png is gone"})
+
     def test_a_cached_asset_says_again_what_is_wrong_with_it(self):
         (self.place / "models/wall.png").unlink()
         self.bake()

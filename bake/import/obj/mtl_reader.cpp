@@ -511,6 +511,8 @@ void ObjMaterials::resolve(const std::string& folder, const std::string& label,
                              "'" + name_of(beside) + "' is used as the material file",
                              "name it in an mtllib line"});
       paths.push_back(std::move(beside));
+    } else {
+      model.files.push_back((fs::path(folder) / (model.name + ".mtl")).string());
     }
   }
 

@@ -11,12 +11,6 @@
 
 namespace modar {
 
-/// The existing regular file that `name` refers to, looked up in `folder` (absolute names are tried
-/// as they are, too); empty where there is none. Tried in this order: as written; without quotes
-/// and escapes, backslashes as slashes; with any case; the bare file name in `folder`, with any
-/// case.
-std::string find_named_file(std::string_view name, const std::string& folder);
-
 /// The file of a texture statement of an MTL: options before and after the name are ignored.
 /// statement: all after the keyword. name: the part taken for the name, found or not.
 /// transformed: the options scale, shift or disturb the uv.

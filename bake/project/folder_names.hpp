@@ -1,0 +1,34 @@
+// What lies beside an asset under names that the asset does not state letter by letter.
+#pragma once
+
+#include <map>
+#include <mutex>
+#include <set>
+#include <string>
+
+namespace modar {
+
+/// Folders are listed once: files that come later are seen by the next run. May be called by
+/// several threads.
+class FolderNames {
+ public:
+  /// Path of the file that `name`, relative to `folder`, refers to: where there is none, of the one
+  /// that find_named_file() takes instead; where there is none either, as it is stated.
+  std::string located(const std::string& folder, const std::string& name);
+
+  /// Names of pictures beside a model file of which is_texture_name() says that they are its
+  /// texture.
+  std::set<std::string> textures_of(const std::string& model);
+
+ private:
+  struct Names {
+    std::set<std::string> lower;     ///< of all, in small letters
+    std::set<std::string> pictures;  ///< as they are
+  };
+  const Names& names_in(const std::string& folder);
+
+  std::mutex mutex_;
+  std::map<std::string, Names> known_;
+};
+
+}  // namespace modar
