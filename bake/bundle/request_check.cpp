@@ -11,6 +11,7 @@
 
 #include "bake/bundle/light_image.hpp"
 #include "bake/bundle/scene/scene_nodes.hpp"
+#include "bake/bundle/scene/scene_placement.hpp"
 #include "bake/import/read_model.hpp"
 #include "formats/base/nearest.hpp"
 #include "formats/base/path.hpp"

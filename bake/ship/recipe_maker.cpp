@@ -14,6 +14,7 @@
 #include "formats/base/parallel.hpp"
 #include "formats/transport/feature_text.hpp"
 #include "formats/transport/stages.hpp"
+#include "formats/transport/vertex_streams.hpp"
 #include "modar/packed_record.hpp"
 #include "modar/piece.hpp"
 #include "modar/release.hpp"
