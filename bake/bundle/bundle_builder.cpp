@@ -29,6 +29,7 @@
 #include "bake/pattern/pattern.hpp"
 #include "bake/texture/relief/relief.hpp"
 #include "bake/texture/texture_stage.hpp"
+#include "formats/base/path.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/content_summary.hpp"
 #include "formats/pattern_shape.hpp"
@@ -183,10 +184,19 @@ void note_files(const SourceModel& source, std::vector<std::string>& files) {
   }
 }
 
+/// May a picture that is named as the model be its texture? Not where that name is a pattern's.
+bool own_picture(const ModelRequest& model, const BakeRequest& request) {
+  return model.own_picture &&
+         std::none_of(request.patterns.begin(), request.patterns.end(),
+                      [stem = file_stem(model.path)](const PatternRequest& pattern) {
+                        return is_own_picture(file_stem(pattern.path), stem);
+                      });
+}
+
 Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& request,
                                   TextureUses& textures, Report& report, BakeTrace& trace) {
   StageTimer reading(report, "read");
-  Result<SourceModel> source = read_model(model.path, request.jobs);
+  Result<SourceModel> source = read_model(model.path, {request.jobs, own_picture(model, request)});
   if (!source) return tl::unexpected(source.error());
   source->name = model.name;
   report.diagnostics.insert(report.diagnostics.end(), source->diagnostics.begin(),

@@ -12,6 +12,7 @@
 #include "bake/io/terminal.hpp"
 #include "bake/options/request_text.hpp"
 #include "bake/project/project.hpp"
+#include "formats/base/path.hpp"
 
 namespace modar {
 namespace {
@@ -74,6 +75,16 @@ Result<void> take_project(const BundleView& bundle, const std::string& path, Sou
   return {};
 }
 
+/// Did the bake take a picture that is named as the model? What it knew of patterns may be more
+/// than what is given here.
+bool has_own_picture(const BundleView& bundle, const ModelRequest& model) {
+  const std::string stem = file_stem(model.path);
+  for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
+    if (is_own_picture(file_stem(bundle.name(bundle.textures()[t].name)), stem)) return true;
+  }
+  return false;
+}
+
 /// What the sources would be baked as again.
 Result<Sources> read_sources(const BundleView& bundle, const CheckCommand& command) {
   Sources sources;
@@ -94,6 +105,7 @@ Result<Sources> read_sources(const BundleView& bundle, const CheckCommand& comma
   if (request.parameters.empty()) request.parameters = {"none"};
   read_bake_options(bundle.meta(), request);
   MODAR_TRY(name_assets(request));
+  for (ModelRequest& model : request.models) model.own_picture = has_own_picture(bundle, model);
   request.jobs = command.jobs;
   return sources;
 }

@@ -27,14 +27,14 @@ Format format_of(const std::string& extension) {
   return Format::kNone;
 }
 
-Result<SourceModel> read_format(const std::string& path, unsigned jobs) {
+Result<SourceModel> read_format(const std::string& path, const ReadOptions& options) {
   switch (format_of(extension_of(path))) {
     case Format::kObj:
-      return read_obj(path, {jobs});
+      return read_obj(path, options);
     case Format::kGltf:
       return read_gltf(path);
     case Format::kPly:
-      return read_ply(path);
+      return read_ply(path, options);
     case Format::kStl:
       return read_stl(path);
     case Format::kNone:
@@ -59,8 +59,8 @@ Result<void> require_model_format(const std::string& path) {
               format_conversion(path, extension));
 }
 
-Result<SourceModel> read_model(const std::string& path, unsigned jobs) {
-  MODAR_ASSIGN(SourceModel model, read_format(path, jobs));
+Result<SourceModel> read_model(const std::string& path, const ReadOptions& options) {
+  MODAR_ASSIGN(SourceModel model, read_format(path, options));
   for (SourceMaterial& m : model.materials) {
     // Clay is for what has no colour: those of vertices are seen as they are.
     const bool clay = m.diffuse_map.empty() && m.diffuse == glm::vec3(kClay);

@@ -12,8 +12,15 @@
 
 namespace modar {
 
+struct ReadOptions {
+  unsigned jobs = 1;  ///< threads; the result does not depend on it
+  /// A picture that is named as the model may be its texture. False where that picture is a
+  /// pattern.
+  bool own_picture = true;
+};
+
 /// Errors: those of the reader; kUnsupported "model.format" that lists what can be read.
-Result<SourceModel> read_model(const std::string& path, unsigned jobs);
+Result<SourceModel> read_model(const std::string& path, const ReadOptions& options);
 
 /// Is it a file that read_model() has a reader for, by its extension?
 bool is_model_file(const std::string& path);
@@ -21,6 +28,14 @@ bool is_model_file(const std::string& path);
 /// Is a picture's stem that of a model and a word for its colours, as "pawn_albedo" of "pawn"? Such
 /// a picture is the texture of a model that names no material file.
 bool is_texture_name(std::string_view picture, std::string_view model);
+
+/// Is a picture's stem, by its start, that of a model and, by its last word, a map of any kind, as
+/// "pawn_low_normal" of "pawn" and "pawn_albedo" of "pawn_low"? Such a picture is no pattern.
+bool is_map_name(std::string_view picture, std::string_view model);
+
+/// Is a picture's stem that of a model? Such a picture is its texture where ReadOptions and its
+/// sides allow it, and nothing else is.
+bool is_own_picture(std::string_view picture, std::string_view model);
 
 /// The existing regular file that `name` in a model refers to, looked up in `folder` (absolute
 /// names are tried as they are, too); empty where there is none. Tried in this order: as written;
@@ -35,10 +50,6 @@ Result<void> require_model_format(const std::string& path);
 /// An OBJ file that begins with zeros, or is large and has some inside, as a copy that broke off
 /// leaves: read_model() refuses it. A few looks, however large it is.
 bool is_broken_off(const std::string& path);
-
-struct ReadOptions {
-  unsigned jobs = 1;  ///< threads; the result does not depend on it
-};
 
 /// An OBJ text is parsed in blocks of so many bytes, each by one thread. Small enough for a block
 /// and what it parses to to stay in a core's second-level cache, and for little memory to be
@@ -74,7 +85,7 @@ Result<SourceModel> parse_stl(std::string_view bytes, const std::string& label);
 /// Reads a binary or ASCII PLY: positions, normals, uvs and colours of vertices, uvs of corners,
 /// polygons and triangle strips. Errors: kIo "io.open"; kInvalidInput "ply.header", "ply.short"
 /// (the file ends within an element), "ply.number", "ply.no-faces" (a point cloud).
-Result<SourceModel> read_ply(const std::string& path);
+Result<SourceModel> read_ply(const std::string& path, const ReadOptions& options = {});
 Result<SourceModel> parse_ply(std::string_view bytes, const std::string& label);
 
 /// Reads a .gltf with its buffers, or a .glb, through tinygltf: the triangles of the default

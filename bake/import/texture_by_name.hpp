@@ -8,9 +8,11 @@
 namespace modar {
 
 /// Gives all materials of a model that has texture coordinates and names no material file the
-/// picture beside it that is_texture_name() of; a note says which, or how to name one. What has
-/// colours at its vertices needs none. folder: the model's; empty: nothing may be read. label: the
-/// file's name in diagnostics.
-void take_texture_by_name(const std::string& folder, const std::string& label, SourceModel& model);
+/// picture beside it that is_texture_name() of, else, with own_picture, the one that
+/// is_own_picture() of and whose sides are powers of two; a note says which, or how to name one.
+/// What has colours at its vertices needs none. folder: the model's; empty: nothing may be read.
+/// label: the file's name in diagnostics.
+void take_texture_by_name(const std::string& folder, const std::string& label, bool own_picture,
+                          SourceModel& model);
 
 }  // namespace modar

@@ -174,7 +174,7 @@ bool write(const Array<glm::dvec3>& positions, const Triangles& triangles,
 
 Result<std::uint64_t> make_big_obj(const std::string& scan, std::uint64_t triangles,
                                    const std::string& path) {
-  MODAR_ASSIGN(SourceModel source, read_model(scan, 1));
+  MODAR_ASSIGN(SourceModel source, read_model(scan, {}));
   Report report;
   MODAR_ASSIGN(TriMesh mesh, weld(std::move(source), report));
   for (glm::dvec3& p : mesh.positions) p = mesh.placement.center + mesh.placement.scale * p;

@@ -151,7 +151,7 @@ class LightStage {
 
   Result<Pictures> shoot(std::uint32_t index, const Subject& subject) {
     Report quiet;
-    MODAR_ASSIGN(SourceModel source, read_model(subject.path, options_.jobs));
+    MODAR_ASSIGN(SourceModel source, read_model(subject.path, {options_.jobs}));
     MODAR_ASSIGN(const TriMesh mesh, weld(std::move(source), quiet, {options_.jobs}));
     MODAR_ASSIGN(const std::vector<SoftTexture> textures, load_textures(mesh, options_.jobs));
     const SceneRecord& record = bundle_.scenes()[index];

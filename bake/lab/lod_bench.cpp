@@ -184,7 +184,7 @@ class WholeMesh {
 /// The model's surface as its file holds it.
 Result<LevelSurface> source_of(const std::string& path, unsigned jobs) {
   Report report;
-  MODAR_ASSIGN(SourceModel source, read_model(path, jobs));
+  MODAR_ASSIGN(SourceModel source, read_model(path, {jobs}));
   MODAR_ASSIGN(const TriMesh mesh, weld(std::move(source), report, {jobs}));
   LevelSurface surface;
   for (const glm::dvec3& p : mesh.positions) {

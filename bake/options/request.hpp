@@ -27,7 +27,8 @@ struct ModelRequest {
       : path(std::move(file)), name(std::move(called)) {}
 
   std::string path;
-  std::string name;  ///< empty: as name_assets() says
+  std::string name;         ///< empty: as name_assets() says
+  bool own_picture = true;  ///< a picture that is named as the file may be its texture
 };
 
 struct PatternRequest {

@@ -27,6 +27,7 @@
 #include "bake/video/encode_video.hpp"
 #include "formats/base/atomic_file.hpp"
 #include "formats/base/parallel.hpp"
+#include "formats/base/path.hpp"
 #include "formats/content_summary.hpp"
 
 namespace modar {
@@ -166,8 +167,18 @@ class ProjectBake {
            !files_of(asset.file, asset.shape).empty();
   }
 
-  /// The width and the shape of a pattern.
-  [[nodiscard]] static std::string size_of(const ProjectAsset& asset) {
+  /// May a picture that is named as the model be its texture? Not where that name is a pattern's.
+  [[nodiscard]] bool own_picture(const ProjectAsset& model) const {
+    return std::none_of(project_.patterns.begin(), project_.patterns.end(),
+                        [stem = file_stem(model.file)](const ProjectAsset& pattern) {
+                          return is_own_picture(file_stem(pattern.file), stem);
+                        });
+  }
+
+  /// What the project says of an asset beside its settings: the width and the shape of a pattern,
+  /// what may be a model's texture.
+  [[nodiscard]] std::string traits_of(const ProjectAsset& asset) const {
+    if (!asset.pattern) return own_picture(asset) ? "" : "its name is a pattern's";
     return std::to_string(asset.width_mm) +
            (asset.shape.text.empty() ? "" : " " + asset.shape.text);
   }
@@ -188,8 +199,8 @@ class ProjectBake {
                     broken ? std::string(kNoFile) : digests_.of(file)}};
     task.action = digest_of(std::string(task.asset->pattern ? "pattern" : "model") + "\n" +
                             program_ + "\n" + task.inputs[0].path + "\n" + task.inputs[0].digest +
-                            "\n" + size_of(*task.asset) + "\n" + joined(task.settings));
-    if (!task.asset->pattern) task.textures = names_.textures_of(file);
+                            "\n" + traits_of(*task.asset) + "\n" + joined(task.settings));
+    if (!task.asset->pattern) task.textures = names_.textures_of(file, own_picture(*task.asset));
     const auto files =
         names_files(*task.asset) ? cache_.files_of(task.action) : std::vector<std::string>();
     if (files) take_inputs(task, *files);
@@ -216,7 +227,7 @@ class ProjectBake {
       return before->find(key).value_or("").text().value_or("");
     };
     if (text("program") != program_) return "modar itself changed";
-    if (text("settings") != joined(task.settings) || text("width") != size_of(*task.asset)) {
+    if (text("settings") != joined(task.settings) || text("traits") != traits_of(*task.asset)) {
       return "its settings in " + fs::path(project_.file).filename().string() + " changed";
     }
     std::set<std::string> come = task.textures;
@@ -463,6 +474,7 @@ class ProjectBake {
       request.patterns = {{file, task.asset->width_mm, task.asset->shape}};
     } else {
       request.models = {file};
+      request.models[0].own_picture = own_picture(*task.asset);
     }
     Report report;
     BakeTrace trace;
@@ -702,7 +714,7 @@ class ProjectBake {
           {{"id", task.asset->name + (task.asset->pattern ? "\np" : "\nm") + task.tier},
            {"program", program_},
            {"settings", joined(task.settings)},
-           {"width", size_of(*task.asset)},
+           {"traits", traits_of(*task.asset)},
            {"files", std::move(files)}});
     }
     Json bundles = Json::array();

@@ -49,11 +49,14 @@ std::string FolderNames::located(const std::string& folder, const std::string& n
   return found.empty() ? stated : found;
 }
 
-std::set<std::string> FolderNames::textures_of(const std::string& model) {
+std::set<std::string> FolderNames::textures_of(const std::string& model, bool own_picture) {
   const std::string stem = file_stem(model);
   std::set<std::string> textures;
   for (const std::string& picture : names_in(fs::path(model).parent_path().string()).pictures) {
-    if (is_texture_name(file_stem(picture), stem)) textures.insert(picture);
+    const std::string name = file_stem(picture);
+    if (is_texture_name(name, stem) || (own_picture && is_own_picture(name, stem))) {
+      textures.insert(picture);
+    }
   }
   return textures;
 }

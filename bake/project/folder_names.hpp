@@ -16,9 +16,9 @@ class FolderNames {
   /// that find_named_file() takes instead; where there is none either, as it is stated.
   std::string located(const std::string& folder, const std::string& name);
 
-  /// Names of pictures beside a model file of which is_texture_name() says that they are its
-  /// texture.
-  std::set<std::string> textures_of(const std::string& model);
+  /// Names of pictures beside a model file that may be its texture by their name:
+  /// is_texture_name(), and with own_picture is_own_picture().
+  std::set<std::string> textures_of(const std::string& model, bool own_picture);
 
  private:
   struct Names {

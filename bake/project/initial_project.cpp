@@ -1,5 +1,6 @@
 // Writes the first modar.toml from what lies in a folder.
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <iterator>
 #include <map>
@@ -30,6 +31,7 @@ struct Found {
   std::vector<fs::path> left_out;  ///< what looks like a model or a picture and is not read
   std::vector<fs::path> models;    ///< relative to the folder, in byte order
   std::vector<fs::path> pictures;  ///< the same
+  std::vector<fs::path> textures;  ///< pictures that are no patterns; the same
   std::string material_text;       ///< of all MTL and glTF files, in lower case
 };
 
@@ -43,6 +45,58 @@ constexpr std::size_t kMostMaterialBytes = std::size_t{64} << 20;
 
 std::string text_of(const fs::path& path) {
   return ascii_lower(read_file(path.string(), kMostMaterialBytes).value_or(""));
+}
+
+/// A file's name as glTF writes it, in small letters as the text that is searched for it.
+std::string as_uri(const std::string& file) {
+  std::string uri;
+  for (const char c : file) {
+    const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') ||
+                       std::string_view("-._~").find(c) != std::string_view::npos;
+    char escaped[4];
+    std::snprintf(escaped, sizeof escaped, "%%%02x", static_cast<unsigned char>(c));
+    uri += plain ? std::string(1, c) : escaped;
+  }
+  return uri;
+}
+
+/// Does a text name a file? "wall1.png" does not name "1.png".
+bool names_file(const std::string& text, const std::string& file) {
+  for (std::size_t at = text.find(file); at != std::string::npos; at = text.find(file, at + 1)) {
+    if (at == 0 || std::string_view(" \t\"'/\\").find(text[at - 1]) != std::string_view::npos) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Files above it are not read to see what they hold.
+constexpr std::uintmax_t kMostModelBytes = 100'000'000;  // a second of reading
+
+std::optional<SourceModel> small_model(const fs::path& path) {
+  std::error_code error;
+  if (fs::file_size(path, error) > kMostModelBytes || error) return std::nullopt;
+  auto source = read_model(path.string(), {});
+  return source ? std::optional(std::move(*source)) : std::nullopt;
+}
+
+/// Is a picture a texture: one that a material names, or that is a model's by its name?
+bool is_texture(const fs::path& picture, const Found& found) {
+  const std::string name = ascii_lower(picture.filename().string());
+  if (names_file(found.material_text, name)) return true;
+  if (names_file(found.material_text, as_uri(name))) return true;
+  const std::string stem = picture.stem().string();
+  return std::any_of(found.models.begin(), found.models.end(), [&](const fs::path& model) {
+    if (model.parent_path() != picture.parent_path()) return false;
+    if (is_map_name(stem, model.stem().string())) return true;
+    if (!is_own_picture(stem, model.stem().string())) return false;
+    const auto source = small_model(fs::path(found.folder) / model);
+    return source &&
+           std::any_of(source->materials.begin(), source->materials.end(),
+                       [&](const SourceMaterial& material) {
+                         return fs::path(material.diffuse_map).filename() == picture.filename();
+                       });
+  });
 }
 
 Result<Found> look_through(const std::string& folder) {
@@ -75,31 +129,30 @@ Result<Found> look_through(const std::string& folder) {
   std::sort(found.models.begin(), found.models.end());
   std::sort(found.pictures.begin(), found.pictures.end());
   std::sort(found.left_out.begin(), found.left_out.end());
-  // What a material names is a texture, and what is named as one of a model beside it.
-  std::erase_if(found.pictures, [&](const fs::path& picture) {
-    const auto is_of = [&](const fs::path& model) {
-      return model.parent_path() == picture.parent_path() &&
-             is_texture_name(picture.stem().string(), model.stem().string());
-    };
-    return found.material_text.find(ascii_lower(picture.filename().string())) !=
-               std::string::npos ||
-           std::any_of(found.models.begin(), found.models.end(), is_of);
-  });
+  const auto patterns =
+      std::stable_partition(found.pictures.begin(), found.pictures.end(),
+                            [&](const fs::path& picture) { return !is_texture(picture, found); });
+  found.textures.assign(patterns, found.pictures.end());
+  found.pictures.erase(patterns, found.pictures.end());
   return found;
 }
 
 /// "; left out: a.fbx, b.pdf", or nothing.
-std::string left_out_words(const Found& found) {
+std::string list_of(const char* what, const std::vector<fs::path>& files) {
   constexpr std::size_t kMostNames = 6;
   std::string words;
-  for (std::size_t i = 0; i < std::min(kMostNames, found.left_out.size()); ++i) {
-    words += (i == 0 ? "; left out, since such files are not read: " : ", ") +
-             found.left_out[i].string();
+  for (std::size_t i = 0; i < std::min(kMostNames, files.size()); ++i) {
+    words += (i == 0 ? what : ", ") + files[i].string();
   }
-  if (found.left_out.size() > kMostNames) {
-    words += " and " + std::to_string(found.left_out.size() - kMostNames) + " more";
+  if (files.size() > kMostNames) {
+    words += " and " + std::to_string(files.size() - kMostNames) + " more";
   }
   return words;
+}
+
+std::string left_out_words(const Found& found) {
+  return list_of("; textures, so no patterns: ", found.textures) +
+         list_of("; left out, since such files are not read: ", found.left_out);
 }
 
 /// A TOML text in quotes, of a file name that a glob matches as it is.
@@ -121,20 +174,34 @@ std::string folder_or_path(const fs::path& file, const std::set<std::string>& ta
   return name;
 }
 
+/// The glob of all files of a file's extension in its folder, as TOML has it without the quotes.
+std::string glob_around(const fs::path& file) {
+  const fs::path folder = file.parent_path();
+  const std::string prefix = folder.empty() ? "" : quoted((folder / "").string(), true);
+  return (prefix.empty() ? "" : prefix.substr(1, prefix.size() - 2)) + "*" +
+         file.extension().string();
+}
+
+/// The value of "file": a glob, and what it would match that is none of these assets.
+std::string glob_without(const std::string& glob, const std::vector<fs::path>& others) {
+  std::string list;
+  for (const fs::path& other : others) {
+    if (glob_around(other) != glob) continue;
+    const std::string name = quoted(other.string(), true);
+    list += ", \"!" + name.substr(1);
+  }
+  return list.empty() ? "\"" + glob + "\"" : "[\"" + glob + "\"" + list + "]";
+}
+
 /// "[[model]]" tables of the files: one glob a folder and extension where all names differ, else a
-/// table a file. names: receives what scenes call them.
+/// table a file. others: files that are none of them. names: receives what scenes call them.
 std::string tables(const std::string& kind, const std::vector<fs::path>& files,
-                   const std::string& comment, std::vector<std::string>& names) {
+                   const std::vector<fs::path>& others, const std::string& comment,
+                   std::vector<std::string>& names) {
   std::map<std::string, int> stems;
   for (const fs::path& file : files) ++stems[file.stem().string()];
   std::map<std::string, std::vector<fs::path>> groups;  // by glob
-  for (const fs::path& file : files) {
-    const fs::path folder = file.parent_path();
-    const std::string prefix = folder.empty() ? "" : quoted((folder / "").string(), true);
-    groups[(prefix.empty() ? "" : prefix.substr(1, prefix.size() - 2)) + "*" +
-           file.extension().string()]
-        .push_back(file);
-  }
+  for (const fs::path& file : files) groups[glob_around(file)].push_back(file);
   std::string text;
   std::set<std::string> taken;
   for (const auto& [glob, group] : groups) {
@@ -142,7 +209,7 @@ std::string tables(const std::string& kind, const std::vector<fs::path>& files,
       return stems[file.stem().string()] == 1;
     });
     if (plain && group.size() > 1) {
-      text += "[[" + kind + "]]\nfile = \"" + glob + "\"" + comment + "\n\n";
+      text += "[[" + kind + "]]\nfile = " + glob_without(glob, others) + comment + "\n\n";
       for (const fs::path& file : group) taken.insert(file.stem().string());
       continue;
     }
@@ -169,10 +236,7 @@ constexpr const char* kSceneHints =
 
 /// How a model would stand: "y", and how that is known. Large files are not read for it.
 std::optional<Upright> upright_of(const fs::path& path) {
-  constexpr std::uintmax_t kMostBytes = 100'000'000;  // a second of reading
-  std::error_code error;
-  if (fs::file_size(path, error) > kMostBytes || error) return std::nullopt;
-  auto source = read_model(path.string(), 1);
+  auto source = small_model(path);
   if (!source) return std::nullopt;
   if (source->up.reason != UpReason::kConvention) return source->up;
   Report report;
@@ -289,9 +353,9 @@ Result<InitialProject> initial_project(const std::string& folder) {
       "#min-grade = \"C\"\n\n";
   std::vector<std::string> models;
   std::vector<std::string> patterns;
-  text += tables("model", found.models, "", models);
+  text += tables("model", found.models, {}, "", models);
   text +=
-      tables("pattern", found.pictures,
+      tables("pattern", found.pictures, found.textures,
              "\n#width-mm = 210          # as printed, where the file does not state it", patterns);
   text += scenes(found, models, patterns);
   while (text.ends_with("\n\n")) text.pop_back();

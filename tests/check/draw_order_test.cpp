@@ -118,7 +118,7 @@ double wrong_share(const std::string& path) {
     ADD_FAILURE() << to_line(bundle.error());
     return 1;
   }
-  const TriMesh mesh = *weld(*read_model(path, 1), report, {1});
+  const TriMesh mesh = *weld(*read_model(path, {}), report, {1});
   const auto renderer = *Renderer::create(*bundle, probe_gl_caps());
   renderer->set_options(plain_light());
   EXPECT_TRUE(renderer->resize(kSide, kSide));

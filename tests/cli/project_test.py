@@ -685,6 +685,30 @@ class Init(ProjectTest):
         scenes = self.modar_json("inspect", self.place / "out/museum.modar")["scenes"]
         self.assertEqual([(s["pattern"], s["model"]) for s in scenes], [("a", "a")])  # by their name
 
+    def test_a_texture_is_no_pattern(self):
+        for name, sides in (("models/b.png", (64, 32)), ("models/b_normal.png", (64, 64)), ("models/cover.png", (48, 32)),
+                            ("models/poster.png", (48, 36)), ("models/l.png", (48, 36))):  # wall.png does not name l.png
+            picture(self.place / name, *sides)
+        (self.place / "modar.toml").unlink()
+        done = self.modar("init", self.place)
+        self.assertIn("textures, so no patterns: models/b.png, models/b_normal.png, models/wall.png", done.stderr)
+        self.write((self.place / "modar.toml").read_text().replace("[bake]", "[bake]\nloop-views = 8\nscore = false\nocclusion = false"))
+        assets = [asset["name"] for asset in self.bake("--dry-run")["assets"]]
+        self.assertEqual(sorted(assets), sorted(["a", "a", "b", "cover", "poster", "l"]))
+        self.bake()
+        bundle = self.place / "out/museum.modar"
+        textures = lambda: {texture["name"] for texture in self.modar_json("inspect", bundle)["textures"]}
+        source = lambda: self.assertEqual(self.modar("check", bundle, "--source", "modar.toml", cwd=self.place).returncode, 0)
+        self.assertEqual(textures(), {"wall.png", "b.png"})
+        source()
+        # A project that names it as a pattern is believed.
+        with open(self.place / "modar.toml", "a") as file:
+            file.write("[[pattern]]\nfile = \"models/b.png\"\n[[bundle]]\nname = \"museum\"\nmodels = \"*\"\npatterns = \"a\"\n")
+        self.assertEqual(self.reasons()["b"], "its settings in modar.toml changed")
+        self.bake()
+        self.assertEqual(textures(), {"wall.png"})
+        source()
+
     def test_names_that_collide_and_odd_ones(self):
         (self.place / "more").mkdir()
         shutil.copy(self.place / "models/b.obj", self.place / "more/b.obj")

@@ -158,7 +158,7 @@ TEST_F(MtlReader, TheMeanOfATextureIsNotMultipliedByIt) {
   std::ofstream(folder_ / "m.obj") << "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"
                                       "usemtl mean\nf 1 2 3\nusemtl tint\nf 1 2 3\n"
                                       "usemtl broken\nf 1 2 3\nusemtl plain\nf 1 2 3\n";
-  const auto model = read_model((folder_ / "m.obj").string(), 1);
+  const auto model = read_model((folder_ / "m.obj").string(), {});
   ASSERT_TRUE(model) << to_line(model.error());
   ASSERT_EQ(model->materials.size(), 5u);
   EXPECT_EQ(model->materials[1].diffuse, glm::vec3(1.0f));
@@ -226,8 +226,26 @@ TEST_F(MtlReader, ObjWithoutMaterialsTakesThePictureOfItsName) {
   }
 }
 
+TEST_F(MtlReader, APictureOfTheModelsOwnNameIsItsTextureIfItsSidesArePowersOfTwo) {
+  const auto picture = [&](const char* name, std::uint32_t width, std::uint32_t height) {
+    const RgbaImage image{width, height, std::vector<std::uint8_t>(4ULL * width * height, 200)};
+    EXPECT_TRUE(write_png(image, (folder_ / name).string()));
+  };
+  const auto texture = [&](const ReadOptions& options = {}) {
+    const auto model = read_model((folder_ / "pawn.obj").string(), options);
+    return fs::path(model ? model->materials[1].diffuse_map : "none").filename().string();
+  };
+  write_textured(folder_ / "pawn.obj");
+  picture("pawn.png", 48, 32);  // a photo, or the print that it stands on
+  EXPECT_EQ(texture(), "");
+  picture("pawn.png", 64, 32);
+  EXPECT_EQ(texture(), "pawn.png");
+  EXPECT_EQ(texture({.own_picture = false}), "");
+  picture("pawn_colour.png", 48, 32);
+  EXPECT_EQ(texture(), "pawn_colour.png");
+}
+
 TEST_F(MtlReader, OtherPicturesAreNoTextures) {
-  // That of the model's own name may be the pattern that it stands on.
   for (const char* name : {"pawn.png", "pawn_normal.png", "pawns_albedo.png", "pawnalbedo.png",
                            "pawn_albedo.txt", "pawn_.png", "rook_albedo.png"}) {
     std::ofstream(folder_ / name) << "picture";

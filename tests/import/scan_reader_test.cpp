@@ -98,7 +98,7 @@ TEST(ReadModel, ColoursOfVerticesAreSeenAsTheyAre) {
     const std::string path = ::testing::TempDir() + "modar_clay.obj";
     std::ofstream(path) << "v 0 0 0" << vertex_tail << "\nv 1 0 0" << vertex_tail << "\nv 0 1 0"
                         << vertex_tail << "\nf 1 2 3\n";
-    const auto model = read_model(path, 1);
+    const auto model = read_model(path, {});
     std::filesystem::remove(path);
     return model ? model->materials.at(0).diffuse : glm::vec3(-1.0f);
   };

@@ -63,7 +63,7 @@ const std::map<std::string, std::string>& known_differences() {
 
 /// Answers whether both read it.
 bool expect_same_as_assimp(const std::string& path) {
-  const auto ours = read_model(path, 1);
+  const auto ours = read_model(path, {});
   if (!ours || known_differences().contains(fs::path(path).filename().string())) return false;
   const SurfaceFigures theirs = testing::load_with_assimp(path);
   if (!theirs.loaded || theirs.faces == 0) return false;

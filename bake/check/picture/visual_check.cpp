@@ -110,9 +110,9 @@ class Looker {
     return plain_renderer_->resize(options_.side, options_.side);
   }
 
-  Result<ModelLook> look(std::uint32_t index, const std::string& path) {
+  Result<ModelLook> look(std::uint32_t index, const ModelRequest& asked) {
     Report quiet;
-    MODAR_ASSIGN(SourceModel source, read_model(path, options_.jobs));
+    MODAR_ASSIGN(SourceModel source, read_model(asked.path, {options_.jobs, asked.own_picture}));
     MODAR_ASSIGN(TriMesh mesh, weld(std::move(source), quiet, {options_.jobs}));
     const auto upright = stated_upright(bundle_, index);
     ReliefOptions relief;
@@ -259,7 +259,7 @@ Result<std::vector<ModelLook>> check_looks(const BundleView& bundle, const Visua
         options.models.begin(), options.models.end(),
         [&](const ModelRequest& source) { return source.name == bundle.name(model.name); });
     if (path == options.models.end()) continue;  // SOURCE_MISSING reports it
-    MODAR_ASSIGN(ModelLook look, looker.look(m, path->path));
+    MODAR_ASSIGN(ModelLook look, looker.look(m, *path));
     looks.push_back(std::move(look));
   }
   return looks;

@@ -222,7 +222,7 @@ class SourceCheck {
         missing("model", model.name, &model, strange_model_);
         continue;
       }
-      MODAR_TRY(check_model(model, path->path, request, report));
+      MODAR_TRY(check_model(model, *path, request, report));
     }
     for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) check_texture(t);
     for (std::uint32_t p = 0; p < bundle_.patterns().size(); ++p) check_pattern(p);
@@ -354,10 +354,10 @@ class SourceCheck {
     }
   }
 
-  Result<void> check_model(const ModelRecord& model, const std::string& path,
+  Result<void> check_model(const ModelRecord& model, const ModelRequest& asked,
                            const BakeRequest& request, Report& report) {
     Report quiet;
-    MODAR_ASSIGN(SourceModel source, read_model(path, request.jobs));
+    MODAR_ASSIGN(SourceModel source, read_model(asked.path, {request.jobs, asked.own_picture}));
     MODAR_ASSIGN(TriMesh mesh, weld(std::move(source), quiet, {request.jobs}));
     if (request.most_triangles != 0) mesh = reduce(std::move(mesh), request.most_triangles, quiet);
     cut_as_baked(model, mesh);

@@ -476,7 +476,7 @@ void ObjMaterials::add_library(const std::string& text, std::uint64_t line) {
   libraries_.push_back({text, line});
 }
 
-void ObjMaterials::resolve(const std::string& folder, const std::string& label,
+void ObjMaterials::resolve(const std::string& folder, const std::string& label, bool own_picture,
                            SourceModel& model) {
   std::vector<Diagnostic>& diagnostics = model.diagnostics;
   std::vector<SourceMaterial>& materials = model.materials;
@@ -517,7 +517,7 @@ void ObjMaterials::resolve(const std::string& folder, const std::string& label,
   }
 
   if (paths.empty()) {
-    take_texture_by_name(folder, label, model);
+    take_texture_by_name(folder, label, own_picture, model);
     if (!materials[0].diffuse_map.empty()) return;
   }
 

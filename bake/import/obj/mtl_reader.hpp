@@ -25,9 +25,10 @@ class ObjMaterials {
   std::uint32_t use(const std::string& name, std::uint64_t line);
   void add_library(const std::string& text, std::uint64_t line);
   /// Reads the MTL files and fills in what they say of the materials in use; what is missing
-  /// becomes a diagnostic. folder: empty where nothing may be read. model: has its name; receives
-  /// materials, diagnostics and files.
-  void resolve(const std::string& folder, const std::string& label, SourceModel& model);
+  /// becomes a diagnostic. folder: empty where nothing may be read. own_picture: as in ReadOptions.
+  /// model: has its name; receives materials, diagnostics and files.
+  void resolve(const std::string& folder, const std::string& label, bool own_picture,
+               SourceModel& model);
 
  private:
   struct Named {

@@ -56,7 +56,7 @@ class ObjAssembler {
   [[nodiscard]] bool needs_checked_pass() const;
   [[nodiscard]] bool too_large() const;
   /// Reads the materials and turns tallies into diagnostics.
-  void finish(const std::string& folder, const std::string& label);
+  void finish(const std::string& folder, const std::string& label, const ReadOptions& options);
 
  private:
   template <class T>
@@ -275,7 +275,8 @@ void ObjAssembler::finish_colours(const std::string& label) {
   }
 }
 
-void ObjAssembler::finish(const std::string& folder, const std::string& label) {
+void ObjAssembler::finish(const std::string& folder, const std::string& label,
+                          const ReadOptions& options) {
   finish_colours(label);
   for (std::size_t i = 0; i < notes_.size(); ++i) {
     if (notes_[i].count == 0) continue;
@@ -283,7 +284,7 @@ void ObjAssembler::finish(const std::string& folder, const std::string& label) {
     model_.diagnostics.push_back({text.id, text.severity, label, notes_[i].first_line,
                                   std::to_string(notes_[i].count) + " " + text.message, text.cure});
   }
-  materials_.resolve(folder, label, model_);
+  materials_.resolve(folder, label, options.own_picture, model_);
 }
 
 // The threads. Blocks are cut at fixed places, so the result does not depend on the number of
@@ -427,12 +428,12 @@ void shrink_arrays(SourceModel& model) {
 /// One pass over the text. totals: as in read_obj_blocks(). Returns the counts where some corner
 /// refers to nothing, so that a checked pass has to follow; otherwise nothing.
 Result<std::optional<ObjCounts>> parse_once(const ByteSource& source, const std::string& folder,
-                                            const std::string& label, unsigned jobs,
+                                            const std::string& label, const ReadOptions& options,
                                             const ObjCounts* totals, SourceModel& model) {
   ObjAssembler assembler(model, source.size());
-  MODAR_TRY(read_obj_blocks(source, label, jobs, totals, assembler));
+  MODAR_TRY(read_obj_blocks(source, label, options.jobs, totals, assembler));
   if (totals == nullptr && assembler.needs_checked_pass()) return assembler.counts();
-  assembler.finish(folder, label);
+  assembler.finish(folder, label, options);
   return std::nullopt;
 }
 
@@ -450,11 +451,11 @@ Result<SourceModel> parse_source(const ByteSource& source, const std::string& fo
   SourceModel model;
   model.name = stem;
   MODAR_ASSIGN(const std::optional<ObjCounts> bad,
-               parse_once(source, folder, label, options.jobs, nullptr, model));
+               parse_once(source, folder, label, options, nullptr, model));
   if (bad) {
     model = SourceModel();
     model.name = stem;
-    MODAR_TRY(parse_once(source, folder, label, 1, &*bad, model));
+    MODAR_TRY(parse_once(source, folder, label, {1, options.own_picture}, &*bad, model));
   }
   if (model.face_count() == 0) {
     return fail(

@@ -361,7 +361,7 @@ class PlyReader {
 
 /// One material a picture that the header names, or one without.
 void add_materials(const PlyHeader& header, const std::string& folder, const std::string& label,
-                   SourceModel& model) {
+                   bool own_picture, SourceModel& model) {
   for (const std::string& statement : header.textures) {
     SourceMaterial& material = model.materials.emplace_back();
     bool transformed = false;
@@ -375,18 +375,18 @@ void add_materials(const PlyHeader& header, const std::string& folder, const std
   }
   if (!model.materials.empty()) return;
   model.materials.emplace_back();
-  take_texture_by_name(folder, label, model);
+  take_texture_by_name(folder, label, own_picture, model);
 }
 
 Result<SourceModel> parse(std::string_view bytes, const std::string& folder,
-                          const std::string& label) {
+                          const std::string& label, const ReadOptions& options = {}) {
   MODAR_ASSIGN(const PlyHeader header, parse_ply_header(bytes, label));
   MODAR_ASSIGN(SourceModel model, PlyReader(bytes, header, label).run());
   model.name = std::filesystem::path(label).stem().string();
   if (const auto up = up_in_comments(bytes.substr(0, header.bytes))) {
     model.up = {*up, UpReason::kHeader};
   }
-  add_materials(header, folder, label, model);
+  add_materials(header, folder, label, options.own_picture, model);
   return model;
 }
 
@@ -396,11 +396,11 @@ Result<SourceModel> parse_ply(std::string_view bytes, const std::string& label) 
   return parse(bytes, "", label);
 }
 
-Result<SourceModel> read_ply(const std::string& path) {
+Result<SourceModel> read_ply(const std::string& path, const ReadOptions& options) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
   const std::size_t slash = path.rfind('/');
   return parse({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()},
-               slash == std::string::npos ? "./" : path.substr(0, slash + 1), path);
+               slash == std::string::npos ? "./" : path.substr(0, slash + 1), path, options);
 }
 
 }  // namespace modar
