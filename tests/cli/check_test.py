@@ -13,7 +13,7 @@ try:
 except ImportError:
     jsonschema = None
 
-from programs import COVER, POTTERY, QUICK, ROOT, ProgramTest, picture
+from programs import COVER, POTTERY, QUICK, ROOT, ProgramTest, picture, write_png
 
 OURS = json.loads((ROOT / "bake" / "commands" / "check.schema.json").read_text())
 PROOF = json.loads((ROOT / "bake" / "lab" / "mutation.schema.json").read_text())
@@ -211,6 +211,19 @@ class Check(ProgramTest):
         self.assertEqual(done.returncode, 0, done.stderr)
         looks = json.loads(self.check(0, path, "--json", "--source", "leaves.obj", "--visual", self.folder / "leaves-looks"))
         self.assertLess(looks["looks"][0]["delta_e_worst"], 2.5)
+
+    def test_what_is_cut_out_is_looked_at_and_what_is_seen_through_is_not(self):
+        # Right half clear, left half full: there or not. Then faint all over.
+        for name, alphas in (("fence", [255] * 32 + [0] * 32), ("veil", [100] * 64), ("shade", range(64))):
+            write_png(self.folder / f"{name}.png", 64, [b"".join(bytes([200, 60, 30, alpha]) for alpha in alphas)] * 64, kind=6)
+            (self.folder / f"{name}.mtl").write_text(f"newmtl m\nmap_Kd {name}.png\n")
+            (self.folder / f"{name}.obj").write_text(
+                f"mtllib {name}.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0.2\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n")
+            path = self.folder / f"{name}.modar"
+            done = self.modar("bake", "--model", f"{name}.obj", "-o", path, "--quiet")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            looks = json.loads(self.check(0, path, "--json", "--source", f"{name}.obj", "--visual", self.folder / f"{name}-looks"))["looks"]
+            self.assertEqual([look["judged"] for look in looks], [name == "fence"])
 
     def test_rough_models_are_looked_at_in_many_samples(self):
         # Where every sample falls on another triangle, pictures of 16 samples a pixel differ by 2.75 of 255.

@@ -35,6 +35,14 @@ TURNED = {(15, 95): 4.4, (25, 35): 0.3, (105, 150): 4.5, (605, 655): 2.5, (5, 50
           (605, 711): None}
 
 
+def write_png(path, width, rows, kind=0):
+    """rows: bytes of samples of 8 bits; kind: PNG's colour type."""
+    chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, len(rows), 8, kind, 0, 0, 0)),
+              (b"IDAT", zlib.compress(b"".join(b"\0" + row for row in rows))), (b"IEND", b"")]
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data)) for name, data in chunks))
+
+
 def picture(path, width=200, height=150, mirrored=False):
     """A PNG of gray rectangles, small enough to be a pattern in no time; or its mirror image."""
     random = Random(7)
@@ -45,10 +53,7 @@ def picture(path, width=200, height=150, mirrored=False):
             row[x:x + 16] = bytes([shade] * len(row[x:x + 16]))
     if mirrored:
         rows = [row[::-1] for row in rows]
-    chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)),
-              (b"IDAT", zlib.compress(b"".join(b"\0" + row for row in rows))), (b"IEND", b"")]
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks))
+    write_png(path, width, rows)
 
 
 def covered_clip(path, width=640, height=480):

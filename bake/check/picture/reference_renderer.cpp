@@ -200,7 +200,6 @@ class Canvas {
     const double near = glm::dot(b, inverse);
     const std::size_t at = static_cast<std::size_t>(y) * image_.width + static_cast<std::size_t>(x);
     if (near <= depth_[at]) return;
-    depth_[at] = near;
     const glm::dvec3 w = b * inverse / near;
     glm::dvec4 base = w.x * v[0].colour + w.y * v[1].colour + w.z * v[2].colour;
     if (!texture.levels.empty()) {
@@ -215,8 +214,11 @@ class Canvas {
         return glm::length((uv_at(change) - uv * (change.x + change.y + change.z)) * size);
       };
       const double texels = std::max({slope(step_x), slope(step_y), 1e-9});
-      base *= glm::dvec4(glm::dvec3(look_up(texture, uv, std::log2(texels))), 1.0);
+      const glm::dvec4 texel = look_up(texture, uv, std::log2(texels));
+      if (texel.a < 0.5) return;
+      base *= glm::dvec4(glm::dvec3(texel), 1.0);
     }
+    depth_[at] = near;
     const glm::dvec3 light = w.x * v[0].light + w.y * v[1].light + w.z * v[2].light;
     const glm::dvec3 added = w.x * v[0].added + w.y * v[1].added + w.z * v[2].added;
     const glm::dvec3 colour = linear_to_srgb(

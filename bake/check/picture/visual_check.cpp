@@ -61,7 +61,15 @@ RgbaImage cut(const RgbaImage& image, const Crop& crop) {
   return out;
 }
 
-bool translucent(const TriMesh& mesh) {
+/// Is a part drawn half through? Pictures with alpha are, but for those that are there or not.
+bool translucent(const TriMesh& mesh, const BundleView& bundle, const ModelRecord& model) {
+  for (std::uint32_t m = 0; m < model.material_count; ++m) {
+    const MaterialRecord& material = bundle.materials()[model.first_material + m];
+    if (material.opacity < 1.0f) return true;  // also of a picture of one colour
+    if (material.texture == kNone) continue;
+    const std::uint32_t flags = bundle.textures()[material.texture].flags;
+    if ((flags & kTextureAlpha) != 0 && (flags & kTextureCutOut) == 0) return true;
+  }
   return std::any_of(mesh.materials.begin(), mesh.materials.end(), [](const SourceMaterial& m) {
     return m.opacity < 1.0f || !m.alpha_map.empty();
   });
@@ -122,7 +130,7 @@ class Looker {
     MODAR_TRY(draw_relief(mesh, relief, quiet));
     ModelLook look;
     look.name = bundle_.name(bundle_.models()[index].name);
-    look.judged = !translucent(mesh);
+    look.judged = !translucent(mesh, bundle_, bundle_.models()[index]);
     if (!look.judged) return look;
     MODAR_ASSIGN(const std::vector<SoftTexture> textures, load_textures(mesh, options_.jobs));
     compare(index, mesh, textures, look);
