@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "bake/bundle/bundle_builder.hpp"
+#include "bake/bundle/bundle_json.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/io/output.hpp"
 #include "bake/io/terminal.hpp"

@@ -1,5 +1,6 @@
 // Reads modar.toml. toml++ is known to this file alone.
 #define TOML_EXCEPTIONS 0
+#include <cstdint>  // which toml++ 3.3 takes for granted
 // "[=]" breaks what toml++ 3.0 asserts in debug builds, before it finds the error itself.
 #define TOML_ASSERT(expr) static_assert(true)
 // Where a key has a letter like U+0222, toml++ 3.3 reaches what it calls unreachable: it is no

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <string_view>
 
+#include "bake/image/difference.hpp"
 #include "tests/texture/texture_samples.hpp"
 
 namespace modar {
