@@ -544,6 +544,7 @@ class ProjectBake {
     add_texts(target, content);
     MODAR_TRY(hold_gates(target, content));
     note_budget(target, described, content);
+    note_idle(target);
     for (Diagnostic& alike : alike_patterns(content)) notes_.push_back(std::move(alike));
     return write(target, content);
   }
@@ -651,6 +652,31 @@ class ProjectBake {
                           described.device + " should give " +
                           human_bytes(described.texture_budget) + " at most",
                       "lower max-texture, or make several bundles"});
+  }
+
+  /// Says which models stand on no pattern, and on which patterns nothing stands.
+  void note_idle(const Target& target) {
+    if (target.models.empty() || target.patterns.empty()) return;
+    std::set<std::string> used;  // "\np" behind patterns, "\nm" behind models
+    for (const ProjectScene* scene : target.scenes) {
+      used.insert({scene->request.pattern + "\np", scene->request.model + "\nm"});
+    }
+    for (const bool pattern : {false, true}) {
+      constexpr std::size_t kMostNames = 6;
+      std::size_t count = 0;
+      std::string idle;
+      for (const std::size_t index : pattern ? target.patterns : target.models) {
+        const std::string& name = tasks_[index].asset->name;
+        if (used.count(name + (pattern ? "\np" : "\nm")) != 0) continue;
+        if (++count <= kMostNames) idle += (idle.empty() ? "" : ", ") + name;
+      }
+      if (count == 0) continue;
+      if (count > kMostNames) idle += " and " + std::to_string(count - kMostNames) + " more";
+      notes_.push_back({"project.never-shown", DiagnosticSeverity::kWarning, target.path, 0,
+                        pattern ? "nothing stands on the patterns " + idle
+                                : "no pattern shows the models " + idle,
+                        "write a [[scene]] with pattern and model for each, or leave them out"});
+    }
   }
 
   Result<void> write(Target& target, const BundleContent& content) {

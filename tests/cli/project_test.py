@@ -695,7 +695,8 @@ class Init(ProjectTest):
         self.write((self.place / "modar.toml").read_text().replace("[bake]", "[bake]\nloop-views = 8\nscore = false\nocclusion = false"))
         assets = [asset["name"] for asset in self.bake("--dry-run")["assets"]]
         self.assertEqual(sorted(assets), sorted(["a", "a", "b", "cover", "poster", "l"]))
-        self.bake()
+        idle = [finding["message"] for finding in self.bake()["findings"] if finding["id"] == "project.never-shown"]
+        self.assertEqual(idle, ["no pattern shows the models b", "nothing stands on the patterns cover, l, poster"])
         bundle = self.place / "out/museum.modar"
         textures = lambda: {texture["name"] for texture in self.modar_json("inspect", bundle)["textures"]}
         source = lambda: self.assertEqual(self.modar("check", bundle, "--source", "modar.toml", cwd=self.place).returncode, 0)
