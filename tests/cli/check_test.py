@@ -4,6 +4,7 @@ import os
 import pathlib
 import random
 import shutil
+import struct
 import subprocess
 import tarfile
 import unittest
@@ -224,6 +225,29 @@ class Check(ProgramTest):
             self.assertEqual(done.returncode, 0, done.stderr)
             looks = json.loads(self.check(0, path, "--json", "--source", f"{name}.obj", "--visual", self.folder / f"{name}-looks"))["looks"]
             self.assertEqual([look["judged"] for look in looks], [name == "fence"])
+
+    def test_sheets_are_looked_at(self):
+        # Flat, and seen from both sides: some of the 12 views see its back, and some hardly more than its edge.
+        points = struct.pack("<20f", 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 3, 0, 3, 3, 0, 3) + struct.pack("<6H", 0, 1, 2, 0, 2, 3)
+        picture(self.folder / "sheet.png", 256, 256)
+        (self.folder / "sheet.bin").write_bytes(points)
+        (self.folder / "sheet.gltf").write_text(json.dumps({
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+            "nodes": [{"mesh": 0}, {"mesh": 0, "translation": [1.1, 0.3, 0.01]}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 2}, "indices": 1, "material": 0}]}],
+            "materials": [{"doubleSided": True, "pbrMetallicRoughness": {"metallicFactor": 0, "baseColorTexture": {"index": 0}}}],
+            "textures": [{"source": 0}], "images": [{"uri": "sheet.png"}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+                          {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"},
+                          {"bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC2"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 80, "byteLength": 12},
+                            {"buffer": 0, "byteOffset": 48, "byteLength": 32}],
+            "buffers": [{"uri": "sheet.bin", "byteLength": 92}]}))
+        path = self.folder / "sheet.modar"
+        done = self.modar("bake", "--model", "sheet.gltf", "-o", path, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        looks = json.loads(self.check(0, path, "--json", "--source", "sheet.gltf", "--visual", self.folder / "sheet-looks"))
+        self.assertGreater(looks["looks"][0]["ssim_worst"], 0.9)
 
     def test_rough_models_are_looked_at_in_many_samples(self):
         # Where every sample falls on another triangle, pictures of 16 samples a pixel differ by 2.75 of 255.

@@ -110,7 +110,7 @@ class Canvas {
       const std::uint32_t material = mesh_.triangle_material[t];
       const auto& corners = mesh_.triangles[t];
       fill({shade(corners[0], material), shade(corners[1], material), shade(corners[2], material)},
-           textures_[material]);
+           textures_[material], mesh_.materials[material].two_sided);
     }
     return std::move(image_);
   }
@@ -139,7 +139,8 @@ class Canvas {
   [[nodiscard]] Lit shade(std::uint32_t v, std::uint32_t material) const {
     const SourceMaterial& m = mesh_.materials[material];
     const glm::dvec3 eye(to_eye_ * glm::dvec4(mesh_.positions[v], 1.0));
-    const glm::dvec3 n = glm::normalize(turn_ * glm::dvec3(mesh_.normals[v]));
+    glm::dvec3 n = glm::normalize(turn_ * glm::dvec3(mesh_.normals[v]));
+    if (m.two_sided && glm::dot(n, eye) > 0) n = -n;
     const glm::dvec3 world = to_world_ * n;
     const glm::dvec3 to_key = glm::normalize(glm::dvec3(light_.direction));
     const glm::dvec3 halfway = glm::normalize(to_key - glm::normalize(to_world_ * eye));
@@ -168,14 +169,15 @@ class Canvas {
     return lit;
   }
 
-  void fill(const std::array<Lit, 3>& v, const SoftTexture& texture) {
+  void fill(const std::array<Lit, 3>& v, const SoftTexture& texture, bool two_sided) {
     for (const Lit& lit : v) {
       if (lit.inverse_depth == 0) return;  // views keep models before the camera
     }
     const double area =
         (v[1].x - v[0].x) * (v[2].y - v[0].y) - (v[2].x - v[0].x) * (v[1].y - v[0].y);
-    // Counter-clockwise is front; rows grow downwards. The device draws fronts only, too.
-    if (!(area < 0)) return;
+    // Counter-clockwise is front; rows grow downwards. The device draws backs of two-sided
+    // materials alone, too.
+    if (!(area < 0) && !(two_sided && area > 0)) return;
     const auto [low_x, high_x] = std::minmax({v[0].x, v[1].x, v[2].x});
     const auto [low_y, high_y] = std::minmax({v[0].y, v[1].y, v[2].y});
     const int left = std::max(0, static_cast<int>(std::ceil(low_x)));

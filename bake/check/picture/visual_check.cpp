@@ -51,6 +51,18 @@ Crop shown_part(const RgbaImage& a, const RgbaImage& b, const std::array<std::ui
   return crop;
 }
 
+std::size_t shown_pixels(const RgbaImage& image, const std::array<std::uint8_t, 3>& clear) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
+    count += is_clear(&image.pixels[i], clear) ? 0U : 1U;
+  }
+  return count;
+}
+
+/// Of the pixels that the fullest view shows: a view that shows fewer sees a sheet from its edge,
+/// as a line of pixels that two renderers round to different places.
+constexpr double kLeastShown = 0.02;
+
 RgbaImage cut(const RgbaImage& image, const Crop& crop) {
   RgbaImage out{crop.right - crop.left, crop.bottom - crop.top, {}};
   for (std::uint32_t y = crop.top; y < crop.bottom; ++y) {
@@ -103,19 +115,32 @@ std::vector<std::byte> without_occlusion(const BundleView& bundle) {
 class Looker {
  public:
   Looker(const BundleView& bundle, const VisualOptions& options, const IssueSink& sink)
-      : bundle_(bundle), options_(options), sink_(sink), plain_bytes_(without_occlusion(bundle)) {
+      : bundle_(bundle), options_(options), sink_(sink) {
     render_.clear_colour = {0.5f, 0.5f, 0.5f, 1.0f};
     clear_ = {128, 128, 128};
     camera_ = default_camera(options.side, options.side);
   }
 
-  Result<void> set_up() {
+  /// Before look(): the models as the reference is lit.
+  Result<void> light_evenly() {
     MODAR_ASSIGN(context_, GlContext::create_offscreen());
+    plain_bytes_ = without_occlusion(bundle_);
     MODAR_ASSIGN(const BundleView plain, BundleView::open(plain_bytes_));
+    MODAR_ASSIGN(renderer_, Renderer::create(plain, probe_gl_caps()));
+    renderer_->set_options(render_);
+    return renderer_->resize(options_.side, options_.side);
+  }
+
+  /// Between the last look() and the first levels_of(): the models as they are.
+  Result<void> light_as_baked() {
+    renderer_.reset();
+    plain_bytes_ = {};
     MODAR_ASSIGN(renderer_, Renderer::create(bundle_, probe_gl_caps()));
-    MODAR_ASSIGN(plain_renderer_, Renderer::create(plain, probe_gl_caps()));
-    plain_renderer_->set_options(render_);
-    return plain_renderer_->resize(options_.side, options_.side);
+    return {};
+  }
+
+  Result<std::vector<LevelLook>> levels_of(std::uint32_t index) {
+    return look_at_levels(bundle_, *renderer_, index, {});
   }
 
   Result<ModelLook> look(std::uint32_t index, const ModelRequest& asked) {
@@ -139,7 +164,6 @@ class Looker {
           (std::filesystem::path(options_.picture_folder) / (look.name + ".png")).string();
       MODAR_TRY(write_png(worst_, look.picture));
     }
-    MODAR_ASSIGN(look.levels, look_at_levels(bundle_, *renderer_, index, {}));
     judge(index, look);
     return look;
   }
@@ -155,11 +179,20 @@ class Looker {
     look.ssim_worst = 2;
     look.ssim_mean = look.delta_e_mean = 0;
     const auto views = view_directions();
+    std::vector<RgbaImage> drawn;
+    std::size_t most_shown = 0;
+    for (std::size_t view = 0; view < kViews; ++view) {
+      drawn.push_back(draw(index, view_from(views[view])));
+      most_shown = std::max(most_shown, shown_pixels(drawn.back(), clear_));
+    }
     double shown_views = 0;
     for (std::size_t view = 0; view < kViews; ++view) {
-      const glm::dmat4 to_eye = view_from(views[view]);
-      const RgbaImage wanted = render_reference(mesh, textures, camera_, to_eye, render_);
-      const RgbaImage shown = draw(index, to_eye);
+      const RgbaImage wanted =
+          render_reference(mesh, textures, camera_, view_from(views[view]), render_);
+      const RgbaImage& shown = drawn[view];
+      const std::size_t pixels =
+          std::max(shown_pixels(wanted, clear_), shown_pixels(shown, clear_));
+      if (kLeastShown * static_cast<double>(most_shown) > static_cast<double>(pixels)) continue;
       const Crop crop = shown_part(wanted, shown, clear_);
       if (crop.right <= crop.left) continue;
       const double similar = ssim(cut(wanted, crop), cut(shown, crop));
@@ -187,12 +220,12 @@ class Looker {
   RgbaImage draw(std::uint32_t index, const glm::dmat4& to_eye) {
     const DrawItem item{index, glm::mat4(to_eye)};
     const DepthRange range = depth_range(bundle_, {&item, 1});
-    plain_renderer_->render(RgbImage{}, gl_projection(camera_, range.near_plane, range.far_plane),
-                            {&item, 1});
+    renderer_->render(RgbImage{}, gl_projection(camera_, range.near_plane, range.far_plane),
+                      {&item, 1});
     RgbaImage image{
         static_cast<std::uint32_t>(options_.side), static_cast<std::uint32_t>(options_.side), {}};
     image.pixels.resize(4 * std::size_t{image.width} * image.height);
-    plain_renderer_->read_pixels(image.pixels);
+    renderer_->read_pixels(image.pixels);
     return image;
   }
 
@@ -217,9 +250,8 @@ class Looker {
   std::array<std::uint8_t, 3> clear_{};
   Camera camera_;
   std::unique_ptr<GlContext> context_;
-  std::unique_ptr<Renderer> renderer_;
-  std::vector<std::byte> plain_bytes_;        ///< as the reference is lit
-  std::unique_ptr<Renderer> plain_renderer_;  ///< of these
+  std::vector<std::byte> plain_bytes_;  ///< the bundle as the reference is lit
+  std::unique_ptr<Renderer> renderer_;  ///< of these, then of the bundle
   RgbaImage worst_;
 };
 
@@ -260,7 +292,8 @@ Result<std::vector<ModelLook>> check_looks(const BundleView& bundle, const Visua
   std::vector<ModelLook> looks;
   if (bundle.models().empty()) return looks;
   Looker looker(bundle, options, sink);
-  MODAR_TRY(looker.set_up());
+  MODAR_TRY(looker.light_evenly());
+  std::vector<std::uint32_t> models;  // of the looks
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
     const ModelRecord& model = bundle.models()[m];
     const auto path = std::find_if(
@@ -269,6 +302,12 @@ Result<std::vector<ModelLook>> check_looks(const BundleView& bundle, const Visua
     if (path == options.models.end()) continue;  // SOURCE_MISSING reports it
     MODAR_ASSIGN(ModelLook look, looker.look(m, *path));
     looks.push_back(std::move(look));
+    models.push_back(m);
+  }
+  MODAR_TRY(looker.light_as_baked());
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    if (!looks[i].judged) continue;
+    MODAR_ASSIGN(looks[i].levels, looker.levels_of(models[i]));
   }
   return looks;
 }
