@@ -226,6 +226,19 @@ class Check(ProgramTest):
             looks = json.loads(self.check(0, path, "--json", "--source", f"{name}.obj", "--visual", self.folder / f"{name}-looks"))["looks"]
             self.assertEqual([look["judged"] for look in looks], [name == "fence"])
 
+    def test_light_changes_across_large_faces_as_on_the_device(self):
+        # A cube of 8 vertices, whose normals are those of a ball; its highlight has the light's colour.
+        (self.folder / "cube.mtl").write_text("newmtl m\nKd 0.1 0.1 0.9\nKs 0.5 0.5 0.5\nNs 20\n")
+        (self.folder / "cube.obj").write_text("mtllib cube.mtl\n" + "".join(
+            f"v {x} {y} {z}\nvn {x} {y} {z}\n" for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)) + "usemtl m\n" + "".join(
+            "f " + " ".join(f"{k}//{k}" for k in face) + "\n" for face in
+            ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))))
+        path = self.folder / "cube.modar"
+        done = self.modar("bake", "--model", "cube.obj", "-o", path, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        looks = json.loads(self.check(0, path, "--json", "--source", "cube.obj", "--visual", self.folder / "cube-looks"))
+        self.assertLess(looks["looks"][0]["delta_e_worst"], 3)
+
     def test_sheets_are_looked_at(self):
         # Flat, and seen from both sides: some of the 12 views see its back, and some hardly more than its edge.
         points = struct.pack("<20f", 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 3, 0, 3, 3, 0, 3) + struct.pack("<6H", 0, 1, 2, 0, 2, 3)

@@ -221,10 +221,11 @@ class Canvas {
       base *= glm::dvec4(glm::dvec3(texel), 1.0);
     }
     depth_[at] = near;
-    const glm::dvec3 light = w.x * v[0].light + w.y * v[1].light + w.z * v[2].light;
-    const glm::dvec3 added = w.x * v[0].added + w.y * v[1].added + w.z * v[2].added;
-    const glm::dvec3 colour = linear_to_srgb(
-        srgb_to_linear(v[0].diffuse) * srgb_to_linear(glm::dvec3(base)) * light + added);
+    const glm::dvec3 albedo = srgb_to_linear(v[0].diffuse) * srgb_to_linear(glm::dvec3(base));
+    const auto seen_at = [&](const Lit& lit) {
+      return linear_to_srgb(albedo * lit.light + lit.added);
+    };
+    const glm::dvec3 colour = w.x * seen_at(v[0]) + w.y * seen_at(v[1]) + w.z * seen_at(v[2]);
     for (int c = 0; c < 3; ++c)
       image_.pixels[4 * at + static_cast<std::size_t>(c)] = to_byte(colour[c]);
   }

@@ -34,10 +34,11 @@ glm::dvec3 srgb_to_linear(const glm::dvec3& stored);
 glm::dvec3 linear_to_srgb(const glm::dvec3& linear);
 
 /// Draws a mesh over the clear colour of `options`, in the world of a level camera: light is summed
-/// at vertices as shaders/model.vert does, and multiplied with colours in linear light with sRGB's
-/// own transfer function. Perspective-correct attributes, trilinear textures; opaque, or nothing
-/// where a picture's alpha is below 1/2. to_eye: mesh space to GL eye space. textures: one a
-/// material. Pixels are sampled at their centres.
+/// at vertices as shaders/model.vert does, and multiplied with a pixel's colour in linear light
+/// with sRGB's own transfer function; across a triangle, what its corners would show is mixed
+/// encoded, as light is there. Perspective-correct attributes, trilinear textures; opaque, or
+/// nothing where a picture's alpha is below 1/2. to_eye: mesh space to GL eye space. textures: one
+/// a material. Pixels are sampled at their centres.
 RgbaImage render_reference(const TriMesh& mesh, const std::vector<SoftTexture>& textures,
                            const Camera& camera, const glm::dmat4& to_eye,
                            const RenderOptions& options);
