@@ -124,27 +124,31 @@ async function copyOf(address) {
   if (!canKeep() || await caches.match(address).catch(() => true)) return null;
   const cache = caches.open(BROUGHT);
   const part = (at) => `${address}&part=${at}`;
-  let parts = [], size = 0, at = 0;
+  const bytes = new Uint8Array(PART_BYTES);
+  let size = 0, at = 0;
   brought = cache;
   const put = (name, body) => {
-    const response = new Response(body);
+    const response = new Response(body);  // has a copy; a blob would stay in the browser's process until it is collected
     brought = brought.then(() => cache).then((there) => there.put(name, response));
     brought.catch(() => {});
   };
-  const cut = (bytes) => {
-    const all = new Blob(parts);
-    put(part(at), all.slice(0, bytes));
-    parts = [all.slice(bytes)];
-    size -= bytes;
-    at += bytes;
+  const cut = () => {
+    put(part(at), bytes.subarray(0, size));
+    at += size;
+    size = 0;
   };
   return {
-    add(bytes) {
-      parts.push(new Blob([bytes]));
-      for (size += bytes.length; size >= PART_BYTES;) cut(PART_BYTES);
+    add(more) {
+      for (let from = 0; from < more.length;) {
+        const some = more.subarray(from, from + PART_BYTES - size);
+        bytes.set(some, size);
+        size += some.length;
+        from += some.length;
+        if (size === PART_BYTES) cut();
+      }
     },
     end(whole) {
-      cut(size);
+      cut();
       if (whole) put(address, at);
     },
     kept: (from) => cache.then((there) => there.match(part(from))).then(async (found) => found && new Uint8Array(await found.arrayBuffer()))

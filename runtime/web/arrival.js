@@ -278,9 +278,9 @@ export class RawArrival {
   async bring(stage, take) {
     if (stage !== STAGE.refine) return;
     while (this.#at < this.size) {
-      const bytes = await this.#source.take(Math.min(PASSED, this.size - this.#at));
-      take(this.#at, bytes);
-      this.#at += bytes.length;
+      const size = Math.min(PASSED, this.size - this.#at);
+      take(this.#at, await this.#source.take(size));
+      this.#at += size;
     }
     this.close();
   }

@@ -20,11 +20,17 @@ const TRACKED_SIDE = 640;
 /** By how much the sides of a frame are divided before it is tracked. */
 export const shrinkOf = (width, height) => Math.max(1, Math.floor(Math.max(width, height) / TRACKED_SIDE));
 
-const nowhere = new MessageChannel().port1;
-nowhere.close();
-
-/** Frees the memory of arrays that nothing needs any more: by themselves, browsers let some 64 MB of such pile up. */
-export const release = (...arrays) => nowhere.postMessage(0, arrays.map(({ buffer }) => buffer));
+/**
+ * Frees the memory of arrays that nothing needs any more, which have no bytes then: by themselves, browsers let some 64 MB of such pile up.
+ * What was sent to a port is freed when the port is closed; of a closed one Chromium takes nothing, and transfer() frees nothing that came
+ * from a network.
+ */
+export function release(...arrays) {
+  const { port1, port2 } = new MessageChannel();
+  port1.postMessage(0, arrays.map(({ buffer }) => buffer));
+  port1.close();
+  port2.close();
+}
 
 /** What went wrong: `code` is stable, `cure` says what to do. */
 export class ModarError extends Error {

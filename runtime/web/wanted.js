@@ -1,4 +1,5 @@
 // Levels of detail of a bundle that is larger than what a view may have: brought by ranges when a picture lacks them. Loaded with such.
+import { release } from './engine.js';
 
 /** Requests at once. Levels of a chunk have some 10 KB: where an answer takes 0.3 s, so many fill a line of 10 Mbit/s. */
 const MOST_REQUESTS = 24;
@@ -140,6 +141,7 @@ export class Wanted {
       if (raw) this.#have(piece, offset, raw);
       else this.#comeAgain(piece);
     }
+    if (bytes) release(bytes);
     return true;
   }
 
@@ -147,6 +149,7 @@ export class Wanted {
     this.#coming.delete(piece);
     this.#tries.delete(piece);
     this.#take(offset, raw);
+    release(raw);
     for (const open of [...this.#open]) {  // what is opened meanwhile does not have it
       if (!open.pieces.delete(piece) || open.pieces.size > 0) continue;
       this.#open.delete(open);
@@ -166,7 +169,7 @@ export class Wanted {
   /** Some bytes of the file; null: the host has no ranges. Past the browser's cache: Chromium's answers one request of an address after the other. */
   async #request(at, size) {
     const { bundle, signal } = this.#parts;
-    if (bundle instanceof Uint8Array) return bundle.subarray(at, at + size);
+    if (bundle instanceof Uint8Array) return bundle.slice(at, at + size);
     const response = await fetch(bundle, { signal, headers: { Range: `bytes=${at}-${at + size - 1}` }, cache: 'no-store' });
     if (response.status !== 206) {
       response.body?.cancel().catch(() => {});

@@ -12,8 +12,9 @@ import time
 import unittest
 import urllib.parse
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
+sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[1] / folder) for folder in ("cli", "bench")]
 from browser import CANVAS, KEPT, Browser, Quiet  # noqa: E402
+from page_memory import resident_by_process  # noqa: E402
 from programs import COVER, POTTERY, QUICK, ProgramTest  # noqa: E402
 
 HEADER, PIECE = 64, 64
@@ -85,6 +86,20 @@ DRAW = """(async () => {
   modar?.close();
   document.body.replaceChildren();
   return drawn;
+})()"""
+
+
+# Answers of a network, released one after the other.
+RELEASE = """(async () => {
+  const { release } = await import('/engine.js');
+  const answer = new Blob([new Uint8Array(1e6).fill(7)]);
+  const lengths = [];
+  for (let i = 0; i < 48; ++i) {
+    const bytes = new Uint8Array(await answer.arrayBuffer());
+    release(bytes);
+    lengths.push(bytes.length);
+  }
+  return Math.max(...lengths);
 })()"""
 
 
@@ -267,6 +282,13 @@ class Arrival(ProgramTest):
                 self.assertNotIn(drawn["meanwhile"], (drawn["first"], drawn["whole"]) if "packed" in name else (None,), "the coarsest")
                 if "packed" in name:
                     self.assertEqual(self.http.asked["after"], [None, f"bytes={begins}-"])
+
+    def test_what_is_released_leaves_memory_at_once(self):
+        renderer = lambda: resident_by_process(self.browser.process.pid)["renderer"] / 1e6  # noqa: E731
+        before = renderer()
+        self.assertEqual(self.browser.run(RELEASE), 0)
+        print(f"of 48 MB that were released, {renderer() - before:.0f} MB are in memory")
+        self.assertLess(renderer() - before, 20)
 
     def test_damaged_raw_bundles_are_refused(self):
         bytes_of = "new Uint8Array(await (await fetch('/bundles/demo.modar')).arrayBuffer())"
