@@ -49,6 +49,14 @@ bool has_halves(const LayoutRecord& layout) {
   return false;
 }
 
+/// Whether two bytes of a vertex are of no attribute. offset: a multiple of 2, where one ends.
+bool free_pair(const LayoutRecord& layout, std::uint32_t offset, std::uint32_t occlusion) {
+  bool taken = offset == layout.stride || (occlusion & ~1u) == offset;
+  for (std::uint32_t i = 0; i < layout.attribute_count; ++i)
+    taken = taken || layout.attributes[i].offset == offset;
+  return !taken;
+}
+
 }  // namespace
 
 VertexFormat vertex_format(const LayoutRecord& layout, GLenum half_type, std::uint32_t occlusion) {
@@ -73,6 +81,13 @@ VertexFormat vertex_format(const LayoutRecord& layout, GLenum half_type, std::ui
         occlusion == record.offset + attribute.bytes) {
       ++attribute.components;
       ++attribute.bytes;
+    }
+    // Four components of two bytes are drawn as they are everywhere; of three, drivers of Vulkan
+    // and Direct3D make a copy: 9 MB in Chromium's GPU process, of 38 MB.
+    if (semantic == Semantic::kPosition && attribute.bytes == 6 && !format.widened &&
+        free_pair(layout, record.offset + 6u, occlusion)) {
+      attribute.components = 4;
+      attribute.bytes = 8;
     }
     attribute.offset = format.widened ? end : record.offset;
     // Attributes of a rewritten vertex start at multiples of 4, which every GPU reads fastest.

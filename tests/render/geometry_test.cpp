@@ -4,6 +4,7 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "runtime/render/vertex_format.hpp"
 #include "tests/render/reference.hpp"
 #include "tests/render/scene.hpp"
 
@@ -122,6 +123,28 @@ TEST_F(GeometryTest, HalfFloatsWidenedDrawTheSame) {
   GlCaps caps = probe_gl_caps();
   caps.half_float_vertices = false;
   check_layout(Layout::kHalfColoured, caps, some_view(), true);
+}
+
+/// Vulkan and Direct3D read no three components of two bytes, and copy such vertices.
+TEST(VertexFormatTest, PositionsReadTheirPadding) {
+  constexpr GLenum kHalf = 0x140B;
+  LayoutRecord layout{};
+  layout.stride = 12;
+  layout.attribute_count = 2;
+  layout.attributes[0] = {1, 1, 3, 0, 0, 0};  // position, half float
+  layout.attributes[1] = {2, 4, 3, 1, 8, 0};  // normal, i8
+  const auto components = [&](GLenum half, std::uint32_t occlusion) {
+    return vertex_format(layout, half, occlusion).attributes[kAttributePosition].components;
+  };
+  EXPECT_EQ(components(kHalf, kNone), 4);
+  EXPECT_EQ(components(kHalf, 11), 4);
+  EXPECT_EQ(components(kHalf, 7), 3) << "occlusion lies there";
+  EXPECT_EQ(components(0, kNone), 3) << "floats are written";
+  layout.attributes[1].offset = 6;
+  EXPECT_EQ(components(kHalf, kNone), 3) << "the normal lies there";
+  layout.attributes[1].offset = 0;
+  layout.attributes[0].offset = 6;
+  EXPECT_EQ(components(kHalf, kNone), 3) << "the vertex ends there";
 }
 
 TEST_F(GeometryTest, SixteenBitIntegersDecodeByStepAndOffset) {
