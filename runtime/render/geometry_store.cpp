@@ -62,8 +62,11 @@ void GeometryStore::collect_ranges() {
       for (std::uint32_t i = 0; i < chunk.level_count; ++i) {
         Range& vertices = vertex_ranges_[chunk.first_level + i];
         vertices.layout = bundle_.models()[group.model].layout;
-        if (g < bundle_.models().size()) continue;
-        vertices.rank = index_ranges_[chunk.first_level + i].rank = kStandIn;
+        const bool coarsest = i + 1 == chunk.level_count;
+        vertices.rank = index_ranges_[chunk.first_level + i].rank = g >= bundle_.models().size()
+                                                                        ? kStandIn
+                                                                    : coarsest ? kCoarsest
+                                                                               : 0;
       }
     }
   }
@@ -97,7 +100,9 @@ void GeometryStore::merge_vertex_ranges() {
   std::sort_heap(order.begin(), order.end(), before);
   std::vector<Range> merged;
   for (std::size_t i = 0; i < order.size(); ++i) {
-    if (i == 0 || before(order[i - 1], order[i])) merged.push_back(vertex_ranges_[order[i]]);
+    const Range& range = vertex_ranges_[order[i]];
+    if (i == 0 || before(order[i - 1], order[i])) merged.push_back(range);
+    merged.back().rank = std::max(merged.back().rank, range.rank);
     level_vertices_[order[i]] = static_cast<std::uint32_t>(merged.size() - 1);
   }
   // From the end: of those that begin alike, the largest holds the others where all are uploaded.
@@ -375,8 +380,9 @@ bool GeometryStore::make_resident(Range& range, GlState& gl) {
   return true;
 }
 
-/// Deletes the ranges that were used longest ago until `bytes` fit, stand-ins last: where one chunk
-/// of a view is missing, a stand-in is what is seen. Nothing of this frame.
+/// Deletes the ranges that were used longest ago until `bytes` fit, of each chunk its coarsest
+/// level and stand-ins last: where one chunk of a view is missing, a stand-in is what is seen.
+/// Nothing of this frame.
 bool GeometryStore::evict(std::uint64_t bytes, GlState& gl) {
   while (resident_bytes_ + bytes > budget_) {
     Range* oldest = nullptr;

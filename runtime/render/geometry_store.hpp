@@ -88,12 +88,13 @@ class GeometryStore {
     GLuint buffer = 0;
     std::uint64_t last_used = 0;  ///< frame; kOpen: bytes of it still come
     bool kept = false;            ///< in the bundle's bytes, all of it
-    std::uint64_t rank = 0;       ///< kStandIn: makes room after all others
+    std::uint64_t rank = 0;       ///< makes room after all of lower ones
 
     [[nodiscard]] std::uint64_t age() const { return last_used + rank; }
   };
 
-  /// More than all frames.
+  /// Ranks, more than all frames: of a chunk's coarsest level, of a stand-in's.
+  static constexpr std::uint64_t kCoarsest = std::uint64_t{1} << 61;
   static constexpr std::uint64_t kStandIn = std::uint64_t{1} << 62;
   /// Later than all frames, so that it is not evicted.
   static constexpr std::uint64_t kOpen = ~std::uint64_t{0};

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """A flight over a huge scan in a page that may have little of it on the GPU, in Chromium on a slow line.
 
-    huge_page.py BUNDLE [--max-bytes 64000000] [--line 10e6] [--latency 100] [--seconds 60] [--hold 20] [--nearest 0.02] [--page FOLDER] [--keep FOLDER]
+    huge_page.py BUNDLE [--pan] [--max-bytes 64000000] [--line 10e6] [--latency 100] [--seconds 60] [--hold 20] [--nearest 0.02] [--page FOLDER] [--keep FOLDER]
 
 Makes the page of `modar web`, serves it by ranges, and flies: from far down to the surface, along it, and up again; after a third, at the
-nearest, and at the end it holds still. Prints JSON: frames and the longest one of the flight (milliseconds, with the drawing, which is
-SwiftShader's on a CPU), the longest task of the page's own, bytes that came, those of them that had come before, the greatest number of bytes on the GPU, resident memory of
-all of the browser's processes beside a blank page's, the triangles that were drawn at the end of each hold, and `pops`: each time that the
+nearest, and at the end it holds still. With --pan it comes down in a quarter of the time, swings to and fro at the surface, and holds still
+at the end. Prints JSON: frames and the longest one of the flight (milliseconds, with the drawing, which is SwiftShader's on a CPU), the
+longest task of the page's own, bytes that came, those of them that had come before, the greatest number of bytes on the GPU, resident
+memory of all of the browser's processes beside a blank page's, the triangles that were drawn at the end of each hold, their mean over the
+time of all pictures, how many pictures had less than three quarters of those of the one before (`drops`), and `pops`: each time that the
 picture changed while the eye held still, how far what is seen moved, pixels (median, 95 and 99 % of squares of 32 pixels, by phase
 correlation), from one picture to the next of 30 a second, and in all. Needs python3-opencv for the pops.
 
@@ -37,7 +39,7 @@ SQUARE = 32  # pixels, of which the way is measured
 FLY = """(async () => {
   const [{ load }, { View }] = await Promise.all([import('/modar.js'), import('/modar-view.js')]);
   """ + CANVAS + """
-  const flown = globalThis.flown = { frames: 0, longest: 0, task: 0, gpu: 0, triangles: [], pictures: [], done: false };
+  const flown = globalThis.flown = { frames: 0, longest: 0, task: 0, gpu: 0, triangles: [], mean: 0, drops: 0, pictures: [], done: false };
   new PerformanceObserver((list) => {
     for (const { duration } of list.getEntries()) flown.task = Math.max(flown.task, duration);
   }).observe({ type: 'longtask' });
@@ -49,10 +51,11 @@ FLY = """(async () => {
   flown.shown = (performance.now() - began) / 1000;
   const { low, high } = view.bounds(0);
   const middle = low.map((_, i) => (low[i] + high[i]) / 2), size = Math.max(...high.map((_, i) => high[i] - low[i]));
+  const pan = %(pan)s;
   // The eye goes around the model's middle and looks at it: share of the flight to a matrix.
   const from = (share) => {
-    const near = 0.5 - 0.5 * Math.cos(2 * Math.PI * Math.min(1, Math.max(0, share)));
-    const turn = 4 * share;
+    const near = pan ? Math.min(1, 4 * share) : 0.5 - 0.5 * Math.cos(2 * Math.PI * Math.min(1, Math.max(0, share)));
+    const turn = pan ? 1.5 * Math.sin(12 * share) : 4 * share;
     const eye = [Math.sin(turn), -Math.cos(turn), 0.35], length = Math.hypot(...eye);
     const back = eye.map((x) => x / length), right = [-back[1], back[0], 0].map((x) => x / Math.hypot(back[0], back[1]));
     const up = [back[1] * right[2] - back[2] * right[1], back[2] * right[0] - back[0] * right[2], back[0] * right[1] - back[1] * right[0]];
@@ -60,9 +63,14 @@ FLY = """(async () => {
     const at = middle.map((x, i) => x + back[i] * (reach + size * (3 * (1 - near) + %(nearest)g * near))), dot = (a) => -a.reduce((sum, x, i) => sum + x * at[i], 0);
     return Float32Array.of(right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0, dot(right), dot(up), dot(back), 1);
   };
+  let before = null, time = 0;
   const draw = (share) => {
     view.drawFrom(0, from(share), 500);
     ++flown.frames;
+    const now = performance.now(), took = before ? now - before.now : 0;
+    flown.mean += (view.triangles - flown.mean) * took / Math.max(1, time += took);
+    if (view.triangles < 0.75 * (before?.triangles ?? 0)) ++flown.drops;
+    before = { now, triangles: view.triangles };
     flown.gpu = Math.max(flown.gpu, view.gpuBytes);
   };
   const during = async (seconds, step) => {
@@ -90,7 +98,7 @@ FLY = """(async () => {
     animation.finish();
     return [...seen, models.toDataURL()];
   };
-  for (const [begin, end] of [[0, 1 / 3], [1 / 3, 1 / 2], [1 / 2, 1]]) {
+  for (const [begin, end] of pan ? [[0, 1]] : [[0, 1 / 3], [1 / 3, 1 / 2], [1 / 2, 1]]) {
     await during(%(seconds)g * (end - begin), (part, took) => {
       flown.longest = Math.max(flown.longest, took);
       draw(begin + part * (end - begin));
@@ -195,7 +203,8 @@ def fly(site, bundle, options):
         browser.open(f"http://localhost:{server.server_port}/blank.html")
         blank = sum(settle(browser).values())
         browser.throttle(options.line / 8, options.latency)
-        browser.run(FLY % {"bundle": "/" + bundle, "bytes": options.max_bytes, "seconds": options.seconds, "hold": options.hold, "nearest": options.nearest})
+        browser.run(FLY % {"bundle": "/" + bundle, "bytes": options.max_bytes, "seconds": options.seconds, "hold": options.hold, "nearest": options.nearest,
+                           "pan": str(options.pan).lower()})
         most, end = 0, time.monotonic() + 300 + options.seconds + 3 * options.hold
         while not browser.run("globalThis.flown?.done ?? false") and time.monotonic() < end:
             most = max(most, sum(resident_by_process(browser.process.pid).values()))
@@ -214,6 +223,7 @@ def fly(site, bundle, options):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("bundle", type=pathlib.Path)
+    parser.add_argument("--pan", action="store_true", help="swing to and fro near the surface")
     parser.add_argument("--max-bytes", type=float, default=64e6, help="of the GPU; 0: no limit")
     parser.add_argument("--line", type=float, default=10e6, help="bits a second")
     parser.add_argument("--latency", type=float, default=100, help="milliseconds")

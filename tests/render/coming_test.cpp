@@ -400,5 +400,45 @@ TEST_F(WantedTest, StandInsMakeRoomLast) {
   EXPECT_EQ(seen(0), (Colour{0, 255, 0})) << "the chunk has made room";
 }
 
+/// A chunk that comes into view is there at its coarsest, so that no stand-in of the whole model is
+/// drawn meanwhile. One that is far off is not asked for.
+TEST_F(WantedTest, ChunksAroundTheViewAreAskedFor) {
+  SceneMaker maker;
+  const std::uint32_t material = maker.add_material(flat_material());
+  const std::uint32_t layout = maker.add_layout(Layout::kHalfColoured);
+  const auto square = [](double left, const Rgb& tint) {
+    const glm::dvec3 a(left, -0.25, 0), b(left + 0.25, -0.25, 0), c(left + 0.25, 0.25, 0),
+        d(left, 0.25, 0);
+    return std::vector<Triangle>{{{a, b, c}, {}, tint}, {{a, c, d}, {}, tint}};
+  };
+  std::vector<SceneMaker::Chunk> chunks;
+  for (int i = 0; i < 8; ++i) {
+    const double left = 0.25 * i - 1.0;
+    chunks.push_back(
+        {{square(left, {255, 0, 0}), square(left, {0, 255, 0})}, {0.0f, 0.1f}, material, {}});
+  }
+  maker.add_model(layout, chunks);
+  maker.add_model(layout, {{{square(-1.0, {0, 0, 255})}, {0.0f}, material, {}}});
+  make_stand_in(maker.content, 5.0f);
+  hold(maker.content);
+  const auto renderer = start(1 << 20);
+  ASSERT_TRUE(renderer);
+  renderer->set_options(flat_light());
+  // The right of a picture as wide as two chunks.
+  const auto seen = [&](float x) {
+    const DrawItem item{0, glm::translate(glm::mat4(1.0f), {-x, 0.0f, -0.5f})};
+    const auto pixels = draw(*renderer, default_camera(96, 72), std::span(&item, 1));
+    const std::size_t right = 4 * (36 * 96 + 84);
+    return std::array<int, 3>{pixels[right], pixels[right + 1], pixels[right + 2]};
+  };
+  using Colour = std::array<int, 3>;
+  seen(-0.6f);
+  while (bring(*renderer) > 0) seen(-0.6f);
+  EXPECT_EQ(seen(-0.6f), (Colour{255, 0, 0}));
+  EXPECT_EQ(seen(-0.3f), (Colour{0, 255, 0})) << "around the view before";
+  const std::uint64_t level = 6ull * memory->view.layouts()[0].stride + 6ull * 2;
+  EXPECT_LE(renderer->gpu_memory().geometry, 10 * level) << "of 16";
+}
+
 }  // namespace
 }  // namespace modar
