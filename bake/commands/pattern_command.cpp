@@ -449,13 +449,15 @@ Json confusion_json(const Confusion& confusion) {
                         {"in_photos", confusion.in_photos[shown]}});
   }
   Json keep_apart = Json::array();
-  for (const auto& [a, b] : confusion.keep_apart()) {
-    keep_apart.push_back(Json{{"a", confusion.names[a]}, {"b", confusion.names[b]}});
+  for (const AlikePair& pair : confusion.alike_pairs()) {
+    keep_apart.push_back(Json{{"a", confusion.names[pair.a]},
+                              {"b", confusion.names[pair.b]},
+                              {"told_apart", pair.told_apart}});
   }
   return {{"views", confusion.views},
           {"photo_views", confusion.photo_views},
           {"false_recognitions", confusion.false_recognitions()},
-          {"false_together", confusion.together},
+          {"false_together", confusion.false_together()},
           {"keep_apart", keep_apart},
           {"patterns", patterns}};
 }
@@ -475,10 +477,10 @@ void print_confusion(const Confusion& confusion) {
     }
     std::printf("\n");
   }
-  const char* advice =
-      confusion.together == 0 ? "bake into one bundle, where they are told apart" : "keep apart";
-  for (const auto& [a, b] : confusion.keep_apart()) {
-    std::printf("%s: %s and %s\n", advice, confusion.names[a].c_str(), confusion.names[b].c_str());
+  for (const AlikePair& pair : confusion.alike_pairs()) {
+    std::printf("%s: %s and %s\n",
+                pair.told_apart ? "bake into one bundle, where they are told apart" : "keep apart",
+                confusion.names[pair.a].c_str(), confusion.names[pair.b].c_str());
   }
   for (std::size_t i = 0; i < count; ++i) {
     if (confusion.mirrored[i] == 0) continue;
@@ -486,7 +488,7 @@ void print_confusion(const Confusion& confusion) {
                 confusion.mirrored[i], confusion.views);
   }
   std::printf("false recognitions: %d with one pattern at a time, %d with all in one bundle\n",
-              confusion.false_recognitions(), confusion.together);
+              confusion.false_recognitions(), confusion.false_together());
 }
 
 Result<ExitCode> run_confusion(ConfusionCommand& command) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <span>
 
 #include "formats/base/parallel.hpp"
@@ -86,36 +87,44 @@ Result<std::vector<std::byte>> project_of(const std::vector<NamedPattern>& patte
   return bundle_of_records(pictures, records, nullptr, shapes);
 }
 
-/// Recognitions of patterns other than the one shown (none: patterns.size()).
-Result<int> count_others(PoseLoop& loop, const std::vector<GrayPicture>& views, std::size_t shown) {
-  int others = 0;
+/// Recognitions of each of so many patterns.
+Result<std::vector<int>> count_together(PoseLoop& loop, const std::vector<GrayPicture>& views,
+                                        std::size_t patterns) {
+  std::vector<int> counts(patterns, 0);
   TrackResult seen;
   for (const GrayPicture& view : views) {
     MODAR_TRY(loop.step(view.view(), seen));
-    for (const Detection& each : seen.visible) others += each.pattern != shown ? 1 : 0;
+    for (const Detection& each : seen.visible) ++counts[each.pattern];
   }
-  return others;
+  return counts;
+}
+
+/// Counts of patterns in views of another one.
+int sum_of_others(const std::vector<int>& counts, std::size_t patterns) {
+  int sum = 0;
+  for (std::size_t i = 0; i < counts.size(); ++i) sum += i % (patterns + 1) != 0 ? counts[i] : 0;
+  return sum;
 }
 
 }  // namespace
 
 int Confusion::false_recognitions() const {
-  int sum = 0;
-  for (std::size_t shown = 0; shown < names.size(); ++shown) {
-    for (std::size_t asked = 0; asked < names.size(); ++asked) {
-      if (asked != shown) sum += recognised[shown * names.size() + asked];
-    }
-    sum += in_photos[shown];
-  }
-  return sum;
+  return sum_of_others(recognised, names.size()) +
+         std::accumulate(in_photos.begin(), in_photos.end(), 0);
 }
 
-std::vector<std::array<std::size_t, 2>> Confusion::keep_apart() const {
-  std::vector<std::array<std::size_t, 2>> pairs;
+int Confusion::false_together() const {
+  return sum_of_others(together, names.size()) + photos_together;
+}
+
+std::vector<AlikePair> Confusion::alike_pairs() const {
+  std::vector<AlikePair> pairs;
   for (std::size_t a = 0; a < names.size(); ++a) {
     for (std::size_t b = a + 1; b < names.size(); ++b) {
-      const int times = recognised[a * names.size() + b] + recognised[b * names.size() + a];
-      if (times > 0) pairs.push_back({a, b});
+      const auto times = [&](const std::vector<int>& counts) {
+        return counts[a * names.size() + b] + counts[b * names.size() + a];
+      };
+      if (times(recognised) > 0) pairs.push_back({a, b, times(together) == 0});
     }
   }
   return pairs;
@@ -135,12 +144,6 @@ Result<Confusion> measure_confusion(const std::vector<NamedPattern>& patterns,
   MODAR_ASSIGN(
       const auto loop,
       PoseLoop::create(bundle, default_camera(options.width, options.height), detect_only));
-  const auto recognise = [&](const std::vector<GrayPicture>& views,
-                             std::size_t shown) -> Result<std::vector<int>> {
-    MODAR_ASSIGN(const int others, count_others(*loop, views, shown));
-    confusion.together += others;
-    return count_alone(patterns, views, options);
-  };
   Random random(options.seed);
   const GrayPicture background = made_background(options.width, options.height, random);
   const double all = static_cast<double>(2 * patterns.size() + options.photos.size());
@@ -150,9 +153,10 @@ Result<Confusion> measure_confusion(const std::vector<NamedPattern>& patterns,
   };
   for (const NamedPattern& shown : patterns) {
     confusion.names.push_back(shown.name);
-    const std::size_t index = confusion.names.size() - 1;
-    MODAR_ASSIGN(const auto counts,
-                 recognise(easy_views(shown, options, background, random), index));
+    const std::vector<GrayPicture> views = easy_views(shown, options, background, random);
+    MODAR_ASSIGN(const auto together, count_together(*loop, views, patterns.size()));
+    confusion.together.insert(confusion.together.end(), together.begin(), together.end());
+    MODAR_ASSIGN(const auto counts, count_alone(patterns, views, options));
     confusion.recognised.insert(confusion.recognised.end(), counts.begin(), counts.end());
     step_done();
   }
@@ -171,8 +175,10 @@ Result<Confusion> measure_confusion(const std::vector<NamedPattern>& patterns,
   }
   for (const std::string& path : options.photos) {
     MODAR_ASSIGN(const auto photo, load_background(path, options.width, options.height));
-    MODAR_ASSIGN(const auto counts,
-                 recognise(photo_views(photo, options.views, random), patterns.size()));
+    const std::vector<GrayPicture> views = photo_views(photo, options.views, random);
+    MODAR_ASSIGN(const auto together, count_together(*loop, views, patterns.size()));
+    confusion.photos_together += std::accumulate(together.begin(), together.end(), 0);
+    MODAR_ASSIGN(const auto counts, count_alone(patterns, views, options));
     for (std::size_t i = 0; i < counts.size(); ++i) confusion.in_photos[i] += counts[i];
     step_done();
   }

@@ -2,7 +2,6 @@
 // recognises one in photos that show none.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -23,6 +22,16 @@ struct ConfusionOptions {
   unsigned jobs = 1;  ///< threads; the outcome does not depend on it
 };
 
+/// Two patterns, a series' prints say, of which one was recognised in views of the other.
+struct AlikePair {
+  std::size_t a = 0;
+  std::size_t b = 0;
+  /// A device that knows both tells them apart. Else they are to be kept out of each other's sight,
+  /// or changed in more than a detail.
+  bool told_apart = false;
+  bool operator==(const AlikePair&) const = default;
+};
+
 struct Confusion {
   std::vector<std::string> names;
   int views = 0;
@@ -34,14 +43,16 @@ struct Confusion {
   /// Of each pattern: recognitions in as many views of its mirror image, by a device that knows it
   /// alone.
   std::vector<int> mirrored;
-  /// Recognitions of patterns that were not there, in all views, by a device that knows all
-  /// patterns: of those that claim one place it keeps the one that the frame agrees with best.
-  int together = 0;
+  /// How often a device that knows all patterns recognises `asked` in the views of pattern `shown`:
+  /// [shown * names.size() + asked]. Of patterns that claim one place it keeps the one that the
+  /// frame agrees with best.
+  std::vector<int> together;
+  int photos_together = 0;  ///< its recognitions in views of photos
   /// The same by devices that know one pattern each; mirror images are not counted.
   [[nodiscard]] int false_recognitions() const;
-  /// Pairs of patterns, a series' prints say, of which one was recognised in views of the other: to
-  /// be kept out of each other's sight, or told apart by more than a detail.
-  [[nodiscard]] std::vector<std::array<std::size_t, 2>> keep_apart() const;
+  /// Recognitions of patterns that were not there by the device that knows all.
+  [[nodiscard]] int false_together() const;
+  [[nodiscard]] std::vector<AlikePair> alike_pairs() const;
 };
 
 /// Runs the device's tracker for each pattern on views of every other and on photos. The views are

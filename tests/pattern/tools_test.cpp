@@ -362,9 +362,13 @@ TEST(Confusion, CountsWhoIsTakenForWhom) {
   EXPECT_EQ(confusion->recognised, (std::vector<int>{2, 0, 2, 0, 2, 0, 2, 0, 2}));
   EXPECT_EQ(confusion->false_recognitions(), 4);
   EXPECT_EQ(confusion->mirrored, (std::vector<int>{0, 0, 0}));
-  EXPECT_EQ(confusion->keep_apart(), (std::vector<std::array<std::size_t, 2>>{{0, 2}}));
   // Of a pattern and its copy, the first is believed: both views of the copy are false.
-  EXPECT_EQ(confusion->together, 2);
+  EXPECT_EQ(confusion->together, (std::vector<int>{2, 0, 0, 0, 2, 0, 2, 0, 0}));
+  EXPECT_EQ(confusion->false_together(), 2);
+  EXPECT_EQ(confusion->alike_pairs(), (std::vector<AlikePair>{{0, 2, false}}));
+  Confusion pairs = *confusion;
+  pairs.together = {2, 0, 0, 0, 1, 1, 0, 0, 2};  // another pair's mistake is not this one's
+  EXPECT_EQ(pairs.alike_pairs(), (std::vector<AlikePair>{{0, 2, true}}));
 }
 
 }  // namespace
