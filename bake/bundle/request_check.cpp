@@ -63,8 +63,12 @@ Result<std::uint32_t> find_by_name(const std::vector<std::string>& names, const 
 }
 
 Result<void> check_model(const std::string& path) {
-  MODAR_TRY(require_model_format(path));
   std::error_code error;
+  if (fs::is_directory(path, error)) {
+    return fail(ExitCode::kIo, "io.open", path, "it is a folder",
+                "name a file in it, or run `modar init` and `modar bake` in it");
+  }
+  MODAR_TRY(require_model_format(path));
   const char* cause = nullptr;
   if (::access(path.c_str(), R_OK) != 0) {
     cause = std::strerror(errno);

@@ -52,7 +52,8 @@ Result<void> sort_files(BakeCommand& command) {
                   "run `modar init` and `modar bake` in it");
     }
     MODAR_ASSIGN(const PatternRequest picture, parse_pattern(text));
-    (is_picture_file(picture.path) ? command.patterns : command.models).push_back(std::move(text));
+    const bool is_picture = is_picture_file(picture.path) || is_foreign_picture_file(picture.path);
+    (is_picture ? command.patterns : command.models).push_back(std::move(text));
   }
   command.files.clear();
   return {};

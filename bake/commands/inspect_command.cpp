@@ -6,6 +6,7 @@
 #include "bake/bundle/bundle_json.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/export/extract.hpp"
+#include "bake/io/input.hpp"
 #include "bake/io/terminal.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
@@ -98,11 +99,7 @@ void print_table(const BundleView& bundle, const std::string& path) {
 Result<ExitCode> run_inspect(const InspectCommand& command) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(command.bundle));
   Result<BundleView> bundle = BundleView::open(file.bytes());
-  if (!bundle) {
-    Error error = bundle.error();
-    error.where = command.bundle + (error.where.empty() ? "" : ", " + error.where);
-    return tl::unexpected(std::move(error));
-  }
+  if (!bundle) return in_file(command.bundle, bundle.error());
   if (!command.extract.empty()) {
     MODAR_ASSIGN(const auto files, extract_bundle(*bundle, command.extract, command.force));
     for (const std::string& name : files) std::fprintf(stderr, "wrote %s\n", name.c_str());

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "bake/commands/commands.hpp"
+#include "bake/io/input.hpp"
 #include "bake/io/output.hpp"
 #include "bake/io/terminal.hpp"
 #include "bake/page/report_page.hpp"
@@ -30,7 +31,8 @@ Result<ExitCode> run_report(ReportCommand& command) {
   }));
   MODAR_TRY(try_output(command.output, 0));
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(command.bundle));
-  MODAR_ASSIGN(const BundleView bundle, BundleView::open(file.bytes()));
+  const Result<BundleView> bundle = BundleView::open(file.bytes());
+  if (!bundle) return in_file(command.bundle, bundle.error());
   command.options.title = std::filesystem::path(command.bundle).filename().string();
   if (!command.bake_file.empty()) {
     MODAR_ASSIGN(const MappedFile json, MappedFile::open(command.bake_file));
@@ -39,7 +41,7 @@ Result<ExitCode> run_report(ReportCommand& command) {
   }
   command.options.tool_version = MODAR_VERSION;
   ProgressBar bar(command.quiet);
-  auto page = report_page(bundle, command.options,
+  auto page = report_page(*bundle, command.options,
                           [&](const std::string& stage, double done) { bar.show(stage, done); });
   bar.clear();
   MODAR_ASSIGN(const std::string text, std::move(page));

@@ -29,13 +29,15 @@ inline constexpr std::uint32_t kMaxImageSide = 16384;
 /// images are converted; colour profiles are ignored. The size that a header states is checked
 /// before anything is allocated; a truncated or damaged file is an error, never a partial image.
 /// Errors: kIo "io.open"; kInvalidInput "image.decode", "image.too-large"; kUnsupported
-/// "image.ktx".
+/// "image.ktx", "image.format", both with the command that converts the file.
 Result<RgbaImage> read_image(const std::string& path);
 /// The same from a file's bytes; `name` is what errors call it.
 Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name);
 
 /// Whether a file's name ends as those of the formats do that read_image() reads, in either case.
 bool is_picture_file(const std::string& path);
+/// The same of formats that read_image() names and does not read.
+bool is_foreign_picture_file(const std::string& path);
 
 /// A picture that a camera took.
 struct Photo {

@@ -1,12 +1,13 @@
 // Which library decodes an image file, and what is done with its pixels afterwards.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
+#include <initializer_list>
 #include <string_view>
 
 #include "bake/image/decoders.hpp"
 #include "bake/io/input.hpp"
+#include "formats/base/utf8.hpp"
 
 namespace modar {
 namespace {
@@ -22,6 +23,34 @@ bool starts_with(std::span<const std::byte> bytes, std::string_view text, std::s
                     [](char a, std::byte b) { return static_cast<std::byte>(a) == b; });
 }
 
+/// Formats of pictures that people have and that are not read, by what their files begin with.
+struct ForeignFormat {
+  std::string_view start;
+  std::size_t at;  ///< byte of the file
+  const char* code;
+  const char* name;
+  const char* conversion;
+};
+constexpr const char* kHeifConversion =
+    "heif-convert IN OUT.jpg (Debian's libheif-examples), or let the phone's camera save JPEG";
+constexpr const char* kSvgConversion =
+    "rsvg-convert -w 2000 IN.svg -o OUT.png (Debian's librsvg2-bin)";
+constexpr ForeignFormat kForeignFormats[] = {
+    {"\xABKTX 20\xBB\r\n\x1A\n"sv, 0, "image.ktx", "KTX 2",
+     "ktx extract IN.ktx2 OUT.png (Khronos' KTX-Software); those in a glTF file: npx "
+     "@gltf-transform/cli ktxdecompress IN.glb OUT.glb"},
+    {"ftypheic", 4, "image.format", "HEIC", kHeifConversion},
+    {"ftypheix", 4, "image.format", "HEIC", kHeifConversion},
+    {"ftypmif1", 4, "image.format", "HEIF", kHeifConversion},
+    {"ftypavif", 4, "image.format", "AVIF", kHeifConversion},
+    {"GIF8", 0, "image.format", "GIF", "ffmpeg -i IN.gif -frames:v 1 OUT.png"},
+    {"%PDF-", 0, "image.format", "PDF",
+     "pdftoppm -singlefile -r 200 -png IN.pdf OUT (Debian's poppler-utils)"},
+    {"<svg", 0, "image.format", "SVG", kSvgConversion},
+    {"<?xml", 0, "image.format", "SVG", kSvgConversion},
+    {"8BPS", 0, "image.format", "Photoshop", "ffmpeg -i IN.psd OUT.png"},
+};
+
 Result<StoredImage> decode_stored(std::span<const std::byte> bytes, const std::string& name) {
   if (starts_with(bytes, "\x89PNG\r\n\x1A\n"sv)) return decode_png(bytes, name);
   if (starts_with(bytes, "\xFF\xD8\xFF"sv)) return decode_jpeg(bytes, name);
@@ -29,10 +58,11 @@ Result<StoredImage> decode_stored(std::span<const std::byte> bytes, const std::s
   if (starts_with(bytes, "II*\0"sv) || starts_with(bytes, "MM\0*"sv)) {
     return decode_tiff(bytes, name);
   }
-  if (starts_with(bytes, "\xABKTX 20\xBB\r\n\x1A\n"sv)) {
-    return fail(ExitCode::kUnsupported, "image.ktx", name, "KTX 2 files are not read",
-                "convert it with Khronos' KTX-Software: ktx extract IN.ktx2 OUT.png; those in a "
-                "glTF file: npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb");
+  for (const ForeignFormat& format : kForeignFormats) {
+    if (!starts_with(bytes, format.start, format.at)) continue;
+    return fail(ExitCode::kUnsupported, format.code, name,
+                std::string(format.name) + " files are not read",
+                "convert it: " + std::string(format.conversion));
   }
   return decode_stb(bytes, name);
 }
@@ -121,6 +151,11 @@ double focal_px(const StoredImage& stored) {
   return exif.focal_35mm / kFilmDiagonal * std::hypot(width, height);
 }
 
+bool ends_as(const std::string& path, std::initializer_list<std::string_view> endings) {
+  const std::string ending = ascii_lower(std::filesystem::path(path).extension().string());
+  return std::find(endings.begin(), endings.end(), ending) != endings.end();
+}
+
 }  // namespace
 
 Result<void> check_image_size(std::uint64_t width, std::uint64_t height, const std::string& name) {
@@ -153,11 +188,11 @@ bool is_opaque(const RgbaImage& image) {
 }
 
 bool is_picture_file(const std::string& path) {
-  std::string ending = std::filesystem::path(path).extension().string();
-  for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  constexpr std::array kEndings = {".png"sv, ".jpg"sv,  ".jpeg"sv, ".webp"sv,
-                                   ".tif"sv, ".tiff"sv, ".bmp"sv,  ".tga"sv};
-  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
+  return ends_as(path, {".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".bmp", ".tga"});
+}
+
+bool is_foreign_picture_file(const std::string& path) {
+  return ends_as(path, {".heic", ".heif", ".avif", ".gif", ".pdf", ".svg", ".psd"});
 }
 
 Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name) {

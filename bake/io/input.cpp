@@ -13,6 +13,9 @@ Result<std::string> read_file(const std::string& path, std::size_t most) {
     return fail(ExitCode::kIo, "io.open", path, "the file cannot be opened or read",
                 "check its name and permissions");
   };
+  if (std::error_code error; !file && std::filesystem::is_directory(path, error)) {
+    return fail(ExitCode::kIo, "io.open", path, "it is a folder", "name a file in it");
+  }
   if (!file) return unreadable();
   std::string bytes;
   char part[65536];

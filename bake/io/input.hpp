@@ -20,4 +20,10 @@ inline bool is_regular_file(const std::string& path) {
 /// kInvalidInput "io.too-large".
 Result<std::string> read_file(const std::string& path, std::size_t most);
 
+/// The error of a part of a file, with the file's name before the place.
+inline tl::unexpected<Error> in_file(const std::string& path, Error error) {
+  error.where = path + (error.where.empty() ? "" : ", " + error.where);
+  return tl::unexpected<Error>(std::move(error));
+}
+
 }  // namespace modar

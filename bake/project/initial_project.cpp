@@ -118,9 +118,9 @@ Result<Found> look_through(const std::string& folder) {
     const fs::path relative = it->path().lexically_relative(folder);
     const std::string extension = ascii_lower(relative.extension().string());
     if (is_model_file(relative.string())) found.models.push_back(relative);
-    if (one_of(extension, {".fbx", ".dae", ".blend", ".3ds",  ".usdz", ".usd",  ".max",
-                           ".c4d", ".ma",  ".mb",    ".skp",  ".stp",  ".step", ".las",
-                           ".e57", ".gif", ".heic",  ".avif", ".psd",  ".svg",  ".pdf"})) {
+    if (is_foreign_picture_file(relative.string()) ||
+        one_of(extension, {".fbx", ".dae", ".blend", ".3ds", ".usdz", ".usd", ".max", ".c4d", ".ma",
+                           ".mb", ".skp", ".stp", ".step", ".las", ".e57"})) {
       found.left_out.push_back(relative);
     }
     if (is_picture_file(relative.string())) found.pictures.push_back(relative);

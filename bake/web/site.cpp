@@ -9,6 +9,7 @@
 
 #include "bake/export/model_file.hpp"
 #include "bake/export/room_models.hpp"
+#include "bake/io/input.hpp"
 #include "bake/io/output.hpp"
 #include "bake/json.hpp"
 #include "bake/process/process.hpp"
@@ -290,19 +291,21 @@ Result<std::string> put_bytes(Draft& draft, const std::string& stem,
   return stem + ".packed" + query;
 }
 
-Result<Json> put_bundle(Draft& draft, const std::string& path, std::vector<std::string>& names) {
-  const auto named = [&](Error error) {
-    error.where = path + (error.where.empty() ? "" : ", " + error.where);
-    return tl::unexpected(std::move(error));
-  };
+/// Before anything is written: each bundle is whole, and has what a camera could find.
+Result<void> check_bundle_file(const std::string& path) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
   const Result<BundleView> bundle = BundleView::open(file.bytes());
-  if (!bundle) return named(bundle.error());
-  if (const auto whole = verify_sections(*bundle); !whole) return named(whole.error());
-  if (bundle->patterns().empty()) {
-    return fail(ExitCode::kInvalidInput, "web.pattern", path,
-                "it has no pattern that a camera could find", "bake it with --pattern");
-  }
+  if (!bundle) return in_file(path, bundle.error());
+  if (const auto whole = verify_sections(*bundle); !whole) return in_file(path, whole.error());
+  if (!bundle->patterns().empty()) return {};
+  return fail(ExitCode::kInvalidInput, "web.pattern", path,
+              "it has no pattern that a camera could find", "bake it with --pattern");
+}
+
+Result<Json> put_bundle(Draft& draft, const std::string& path, std::vector<std::string>& names) {
+  MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
+  const Result<BundleView> bundle = BundleView::open(file.bytes());
+  if (!bundle) return in_file(path, bundle.error());
   const std::string stem = fs::path(path).stem().string();
   const std::string name = address(stem);
   if (std::find(names.begin(), names.end(), name) != names.end()) {
@@ -512,6 +515,7 @@ Result<Site> write_site(const SiteOptions& options) {
   if (!options.statement.empty()) {
     MODAR_ASSIGN(publisher, read_publisher(options.statement));
   }
+  for (const std::string& path : options.bundles) MODAR_TRY(check_bundle_file(path));
   MODAR_TRY(claim_output_folder(options.output, options.force));
   for (const char* folder : {"/bundles", "/patterns", "/words"}) {
     MODAR_TRY(make_output_folder(options.output + folder));

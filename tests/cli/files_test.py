@@ -6,7 +6,7 @@ import struct
 import subprocess
 import unittest
 
-from programs import BIN, COVER, POTTERY, STATUE, ProgramTest, picture
+from programs import BIN, COVER, POTTERY, ROOT, STATUE, ProgramTest, picture
 
 GAME = COVER.parent / "game.png"
 
@@ -174,6 +174,31 @@ class Outputs(ProgramTest):
         done = self.modar("pattern", "rectify", COVER, "--corners", "10,10,300,40,310,600,20,650", "-o", "x.jpg")
         self.assert_fails(done, 1, "x.jpg", ".png")
         self.assertFalse((self.folder / "x.jpg").exists())
+
+
+class OtherFiles(ProgramTest):
+    """What is no model, picture or bundle is called what it is, and nothing is written."""
+
+    def test_pictures_that_are_not_read_name_what_converts_them(self):
+        for name, start, tool in (("photo.heic", b"\0\0\0\x18ftypheic\0\0\0\0mif1heic", "heif-convert"),
+                                  ("photo.jpg", b"\0\0\0\x18ftypmif1\0\0\0\0mif1heic", "heif-convert"),
+                                  ("flag.gif", b"GIF89a", "ffmpeg"), ("poster.pdf", b"%PDF-1.7\n", "pdftoppm"),
+                                  ("logo.svg", b"<svg xmlns='http://www.w3.org/2000/svg'/>", "rsvg-convert")):
+            (self.folder / name).write_bytes(start + bytes(99))
+            for words in (["bake", name], ["bake", "--pattern", name], ["pattern", "rectify", name, "--corners", "0,0,9,0,9,9,0,9"]):
+                done = self.modar(*words, "-o", "out.png" if words[0] == "pattern" else "out.modar")
+                self.assert_fails(done, 5, name, tool, "image.format")
+
+    def test_folders_are_called_so(self):
+        (self.folder / "spot").mkdir()
+        for flag in ("--model", "--pattern"):
+            self.assert_fails(self.modar("bake", flag, "spot", "-o", "out.modar"), 2, "spot", "folder")
+
+    def test_files_that_are_no_bundle_are_named_and_leave_no_page(self):
+        (self.folder / "text.modar").write_text(9 * "no bundle ")
+        for words in (["web", "text.modar", "-o", "site", "--page", ROOT / "runtime/web"], ["report", "text.modar", "-o", "page.html"], ["inspect", "text.modar"]):
+            self.assert_fails(self.modar(*words), 3, "text.modar", "bundle.magic")
+        self.assertEqual([path.name for path in self.folder.iterdir()], ["text.modar"])
 
 
 class NeverShown(ProgramTest):
