@@ -205,12 +205,29 @@ void add_project_options(CommandLine& line, ProjectCommand& command) {
 
 namespace {
 
-/// Sizes and times of files and folders, as text that changes when one of them does.
+/// The names of a folder's files. Folders in it do not count: a bake makes some.
+std::string files_in(const std::string& folder) {
+  std::set<std::string> names;
+  std::error_code error;
+  std::filesystem::directory_iterator it(folder, error);
+  for (; !error && it != std::filesystem::directory_iterator(); it.increment(error)) {
+    if (!it->is_directory(error)) names.insert(it->path().filename().string());
+  }
+  std::string text;
+  for (const std::string& name : names) text += name + '\n';
+  return text;
+}
+
+/// Sizes and times of files and names in folders, as text that changes when one of them does.
 std::string states_of(const std::set<std::string>& paths) {
   std::string text;
   for (const std::string& path : paths) {
     struct stat status {};
     const bool there = ::stat(path.c_str(), &status) == 0;
+    if (there && S_ISDIR(status.st_mode)) {
+      text += path + '\n' + files_in(path);
+      continue;
+    }
     text += path + ' ' + std::to_string(there ? status.st_size : -1) + ' ' +
             std::to_string(status.st_mtim.tv_sec) + '.' + std::to_string(status.st_mtim.tv_nsec) +
             '\n';
@@ -218,16 +235,13 @@ std::string states_of(const std::set<std::string>& paths) {
   return text;
 }
 
-/// What a bake of the project reads, and the folders where a glob may match more: not the project's
-/// own, in which a bake itself makes folders.
+/// What a bake of the project reads, and the folders where a glob may match more.
 std::set<std::string> watched_paths(const std::string& file, const ProjectOutcome& outcome) {
-  namespace fs = std::filesystem;
-  const fs::path own = fs::path(file).parent_path();
   std::set<std::string> paths = {file};
   for (const std::string& input : outcome.inputs) {
     paths.insert(input);
-    const fs::path folder = fs::path(input).parent_path();
-    if (folder != own) paths.insert(folder.string());
+    const std::string folder = std::filesystem::path(input).parent_path().string();
+    paths.insert(folder.empty() ? "." : folder);
   }
   return paths;
 }

@@ -644,6 +644,7 @@ class Plan(ProjectTest):
 
 class Watch(ProjectTest):
     def test_a_saved_file_is_baked_again(self):
+        picture(self.place / "new.png", 144, 108)  # beside modar.toml, where a bake makes folders
         bundle = self.place / "out/museum.modar"
         with subprocess.Popen([BIN / "modar", "bake", "--watch"], cwd=self.place, stderr=subprocess.PIPE,
                               text=True) as baker:
@@ -654,6 +655,14 @@ class Watch(ProjectTest):
                 wait()
                 first = bundle.read_bytes()
                 (self.place / "models/cube.mtl").write_text(CUBE_MTL + "Ks 1 1 1\n")
+                wait()
+                self.assertNotEqual(bundle.read_bytes(), first)
+                first = bundle.read_bytes()
+                self.write("[bake]\n" + FAST + "[[model]]\nfile = \"models/*.obj\"\n[[pattern]]\nfile = \"*.png\"\n")
+                wait()
+                self.assertNotEqual(bundle.read_bytes(), first)
+                first = bundle.read_bytes()
+                picture(self.place / "newer.png", 150, 108)
                 wait()
                 self.assertNotEqual(bundle.read_bytes(), first)
                 (self.place / "modar.toml").write_text("[bake\n")  # a broken file waits for its repair
