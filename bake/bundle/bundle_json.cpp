@@ -404,7 +404,8 @@ std::string scene_words(const BundleView& bundle, std::uint32_t index) {
     if (guessed) words += " (" + std::string(up_reason_words(upright->reason)) + ")";
   }
   char text[48];
-  if (const double height = scene_height_mm(bundle, scene); height > 0) {
+  constexpr double kFlat = 0.05;  // mm: a sheet that lies has no height
+  if (const double height = scene_height_mm(bundle, scene); height > kFlat) {
     std::snprintf(text, sizeof text, "%.4g mm high", height);
   } else {
     std::snprintf(text, sizeof text, "scale %.4g", static_cast<double>(scene.scale));
