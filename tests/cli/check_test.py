@@ -1,5 +1,6 @@
 """`modar check` from the outside: verdicts, documents that keep their schemas, severities, devices, the proof."""
 import json
+import math
 import os
 import pathlib
 import random
@@ -238,6 +239,26 @@ class Check(ProgramTest):
         self.assertEqual(done.returncode, 0, done.stderr)
         looks = json.loads(self.check(0, path, "--json", "--source", "cube.obj", "--visual", self.folder / "cube-looks"))
         self.assertLess(looks["looks"][0]["delta_e_worst"], 3)
+
+    def test_white_marks_do_not_colour_what_black_plastic_reflects(self):
+        # By the mean of the texture in linear light, this ball is off by 6.3.
+        columns, rows = 24, 12
+        write_png(self.folder / "ball.png", 256, [bytes([240 if 100 <= y < 112 else 20]) * 256 for y in range(256)])
+        (self.folder / "ball.mtl").write_text("newmtl m\nKs 0.5 0.5 0.5\nNs 300\nmap_Kd ball.png\n")
+        with open(self.folder / "ball.obj", "w") as file:
+            file.write("mtllib ball.mtl\nusemtl m\n")
+            for k in range((columns + 1) * (rows + 1)):
+                turn, fall = 2 * math.pi * (k % (columns + 1)) / columns, math.pi * (k // (columns + 1)) / rows
+                x, y, z = math.sin(fall) * math.cos(turn), math.cos(fall), math.sin(fall) * math.sin(turn)
+                file.write(f"v {x:.5f} {y:.5f} {z:.5f}\nvn {x:.5f} {y:.5f} {z:.5f}\nvt {turn / (2 * math.pi):.5f} {1 - fall / math.pi:.5f}\n")
+            for k in range(1, (columns + 1) * rows + 1):
+                if k % (columns + 1):
+                    file.write("f " + " ".join(f"{i}/{i}/{i}" for i in (k, k + 1, k + columns + 2, k + columns + 1)) + "\n")
+        path = self.folder / "ball.modar"
+        done = self.modar("bake", "--model", "ball.obj", "-o", path, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        looks = json.loads(self.check(0, path, "--json", "--source", "ball.obj", "--visual", self.folder / "ball-looks"))
+        self.assertLess(looks["looks"][0]["delta_e_worst"], 4)
 
     def test_sheets_are_looked_at(self):
         # Flat, and seen from both sides: some of the 12 views see its back, and some hardly more than its edge.
