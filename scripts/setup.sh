@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs Debian packages that are named in scripts/packages*.txt and not yet there.
-#   scripts/setup.sh [test] [demo] [web] [android] [release]
-# Packages of the build always; those of the tests, the demo, the page's engine (web), the Android app and a release where
+#   scripts/setup.sh [test] [demo] [web] [browser] [android] [release]
+# Packages of the build always; those of the tests, the demo, the page's engine (web), browsers, the Android app and a release where
 # named. Uses sudo if not root.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
@@ -9,8 +9,8 @@ here=$(cd "$(dirname "$0")" && pwd)
 lists=("$here/packages.txt")
 for extra in "$@"; do
   case $extra in
-    test | demo | web | android | release) lists+=("$here/packages-$extra.txt") ;;
-    *) echo "setup.sh: '$extra' is not one of test, demo, web, android and release" >&2; exit 1 ;;
+    test | demo | web | browser | android | release) lists+=("$here/packages-$extra.txt") ;;
+    *) echo "setup.sh: '$extra' is not one of test, demo, web, browser, android and release" >&2; exit 1 ;;
   esac
 done
 

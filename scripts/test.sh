@@ -16,7 +16,7 @@ export MODAR_SOAK=0
 case ${1:-} in
   "") ;;
   --ci) packages=(test) ;;
-  --all) packages=(test web android); scopes=ON; MODAR_SOAK=1 ;;
+  --all) packages=(test web browser android); scopes=ON; MODAR_SOAK=1 ;;
   --soak) packages=(test); MODAR_SOAK=full; tests=(-L soak) ;;
   -h | --help) sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 0 ;;
   *) echo "test.sh: unknown option '$1'; try --help" >&2; exit 1 ;;
