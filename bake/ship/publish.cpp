@@ -88,6 +88,39 @@ Result<std::vector<ReleaseBundle>> kept_bundles(const std::vector<ReleaseBundle>
   return kept;
 }
 
+std::string name_of(const std::string& path) {
+  return std::filesystem::path(path).stem().string();
+}
+
+/// Before the first one is packed, which takes long. Errors: kInvalidInput "ship.name",
+/// "ship.bad-bundle"; those of reading them.
+Result<void> check_bundles(const PublishRequest& request) {
+  std::set<std::string> names;
+  for (const std::string& path : request.bundles) {
+    if (!names.insert(lower_case(name_of(path))).second) {
+      return fail(ExitCode::kInvalidInput, "ship.name", path,
+                  "two bundles have this name, or names that differ by case only",
+                  "rename one: a phone's storage may ignore case");
+    }
+    MODAR_TRY(open_bundle(path));
+  }
+  return {};
+}
+
+/// Will there be the bundles whose devices the request names? Errors: kUsage "ship.for".
+Result<void> check_devices(const PublishRequest& request, const std::vector<ReleaseBundle>& kept) {
+  for (const auto& [name, devices] : request.devices) {
+    const bool published =
+        std::any_of(request.bundles.begin(), request.bundles.end(),
+                    [&](const std::string& path) { return name_of(path) == name; });
+    if (!published && find_bundle(kept, name) == nullptr) {
+      return fail(ExitCode::kUsage, "ship.for", name, "the release has no such bundle",
+                  "name one that it has");
+    }
+  }
+  return {};
+}
+
 std::vector<BundleChange> changes_between(const std::vector<ReleaseBundle>& before,
                                           const std::vector<ReleaseBundle>& after) {
   std::vector<BundleChange> changes;
@@ -120,7 +153,7 @@ Result<void> add_bundles(const PublishRequest& request, const ReleaseFolder& fol
       MODAR_ASSIGN(const auto added, folder.add_objects(made, ledger));
       done.added_bytes += added;
     }
-    const std::string name = std::filesystem::path(path).stem().string();
+    const std::string name = name_of(path);
     ReleaseBundle described = describe(name, made);
     auto& bundles = done.release.bundles;
     if (const ReleaseBundle* old = find_bundle(bundles, name)) {
@@ -144,7 +177,7 @@ Result<void> check_kept(const PublishRequest& request, const ReleaseFolder& fold
                         const Release& release, ObjectLedger& ledger) {
   std::set<std::string> written;
   for (const std::string& path : request.bundles) {
-    written.insert(std::filesystem::path(path).stem().string());
+    written.insert(name_of(path));
   }
   for (const ReleaseBundle& bundle : release.bundles) {
     if (!written.contains(bundle.name)) MODAR_TRY(folder.check_objects(bundle, ledger));
@@ -192,15 +225,7 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
     return fail(ExitCode::kUsage, "ship.nothing", request.folder, "there is nothing to publish",
                 "name bundles, or --drop NAME");
   }
-  std::set<std::string> names;
-  for (const std::string& path : request.bundles) {
-    const std::string name = std::filesystem::path(path).stem().string();
-    if (!names.insert(lower_case(name)).second) {
-      return fail(ExitCode::kInvalidInput, "ship.name", path,
-                  "two bundles have this name, or names that differ by case only",
-                  "rename one: a phone's storage may ignore case");
-    }
-  }
+  MODAR_TRY(check_bundles(request));
   MODAR_ASSIGN(const auto folder, ReleaseFolder::open(request.folder));
   MODAR_TRY(folder.check_signer(key.public_key));
   MODAR_ASSIGN(const auto newest, folder.newest());
@@ -212,15 +237,12 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
   done.release.expires = request.expires;
   done.release.fresh_days = request.fresh_days.value_or(newest ? newest->fresh_days : 0);
   MODAR_ASSIGN(done.release.bundles, kept_bundles(before, request));
+  MODAR_TRY(check_devices(request, done.release.bundles));
   ObjectLedger ledger(request.folder);
   MODAR_TRY(add_bundles(request, folder, ledger, done, report));
   for (const auto& [name, devices] : request.devices) {
     for (ReleaseBundle& bundle : done.release.bundles) {
       if (bundle.name == name) bundle.devices = devices;
-    }
-    if (find_bundle(done.release.bundles, name) == nullptr) {
-      return fail(ExitCode::kUsage, "ship.for", name, "the release has no such bundle",
-                  "name one that it has");
     }
   }
   std::sort(done.release.bundles.begin(), done.release.bundles.end(),

@@ -203,9 +203,15 @@ class Publish(ShipTest):
         data = bytearray(self.shop.old.read_bytes())
         data[-1] ^= 1
         broken.write_bytes(data)
-        done = self.modar("ship", "publish", broken, "--to", self.site, "--key", self.shop.key)
+        # Nor what is named beside it: all are looked at before the first is packed.
+        done = self.modar("ship", "publish", self.shop.old, broken, "--to", self.site, "--key", self.shop.key)
         self.assert_fails(done, 3, "ship.bad-bundle", "modar check")
-        self.assertFalse((self.site / "latest").exists())
+        self.assertFalse(self.site.exists())
+
+    def test_devices_of_no_bundle_are_refused_before_it_packs(self):
+        done = self.modar("ship", "publish", self.shop.old, "--for", "vase=mali400", "--to", self.site, "--key", self.shop.key)
+        self.assert_fails(done, 1, "ship.for", "vase")
+        self.assertEqual([path for path in self.site.rglob("*") if path.is_file() and path.name != ".lock"], [])
 
     def test_release_numbers_only_grow(self):
         self.publish(self.shop.old, options=["--release", "5"])
