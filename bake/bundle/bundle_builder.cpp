@@ -204,7 +204,10 @@ Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& 
   note_files(*source, trace.files);
   reading.done(source->positions.size(), source->face_count());
   Result<TriMesh> mesh = weld(std::move(*source), report, {request.jobs});
-  if (!mesh) return tl::unexpected(mesh.error());
+  if (!mesh) {
+    mesh.error().where = model.path;  // it has the model's name only
+    return tl::unexpected(mesh.error());
+  }
   report.uprights.push_back(request.up ? Upright{*request.up, UpReason::kAsked} : find_up(*mesh));
   if (request.topology) {
     TopologyOptions options;

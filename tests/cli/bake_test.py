@@ -328,6 +328,8 @@ class BadInput(ProgramTest):
         self.assert_fails(self.bake("--pattern", "text.png"), 3, "text.png")
         (self.folder / "empty.obj").write_text("# nothing\n")
         self.assert_fails(self.bake("--model", "empty.obj"), 3, "empty.obj")
+        (self.folder / "line.obj").write_text("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+        self.assert_fails(self.bake("--model", "line.obj"), 3, "line.obj: ")
         (self.folder / "m.stl").write_text("solid\n")
         self.assert_fails(self.bake("--model", "m.stl"), 3, "m.stl", "no triangle")
         (self.folder / "m.fbx").write_text("Kaydara FBX Binary")
