@@ -140,10 +140,11 @@ double corner_distance(const std::array<glm::dvec2, 4>& a, const std::array<glm:
 
 namespace modar {
 
-/// Solves A X = B by L D L^T without pivots for any size up to 8: half of Eigen's time, which has
-/// them, and 3 KB less of the device's player. a: n x n, column-major, of which the lower triangle
-/// is read. x: `columns` right-hand sides of n numbers each, replaced by their solutions.
-/// Unobservable unknowns come out as 0; non-finite input gives non-finite output.
+/// Solves A X = B by L D L^T without pivots for any size up to 8. Eigen's, which has them, takes
+/// 42,000 instructions more in a tracked frame (`scripts/foreign.sh budget`) and 4 KB of the
+/// device's player. a: n x n, column-major, of which the lower triangle is read. x: `columns`
+/// right-hand sides of n numbers each, replaced by their solutions. Unobservable unknowns come out
+/// as 0; non-finite input gives non-finite output.
 void solve_symmetric(int n, int columns, const double* a, double* x);
 
 /// The same for column-major fixed-size matrices such as Eigen's; returns the solutions.

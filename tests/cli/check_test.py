@@ -182,6 +182,15 @@ class Check(ProgramTest):
         self.assertIn(b'"parameters": [\n      "orb-500"\n    ]', baked["one"].read_bytes())
         self.assertIn(b'"light": "one.png"', baked["one"].read_bytes())
 
+    def look_at(self, model):
+        """What `modar check --visual` says of a model that was baked by default."""
+        path = self.folder / f"{model}.modar"
+        done = self.modar("bake", "--model", model, "-o", path, "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        looks = json.loads(self.check(0, path, "--json", "--source", model, "--visual", self.folder / f"{model}-looks"))["looks"]
+        self.assertEqual(len(looks), 1)
+        return looks[0]
+
     def test_models_are_looked_at_beside_their_sources(self):
         path = self.folder / "pottery.modar"
         done = self.modar("bake", "--model", POTTERY, "-o", path, "--quiet")
@@ -208,11 +217,8 @@ class Check(ProgramTest):
                 file.write("".join(f"v {x} {y} {0.05 * i}\n" for y in range(9) for x in range(9)))
                 for k in (81 * i + 9 * y + x + 1 for y in range(8) for x in range(8)):
                     file.write(f"f {k} {k + 1} {k + 10} {k + 9}\n")
-        path = self.folder / "leaves.modar"
-        done = self.modar("bake", "--model", "leaves.obj", "-o", path, "--quiet")
-        self.assertEqual(done.returncode, 0, done.stderr)
-        looks = json.loads(self.check(0, path, "--json", "--source", "leaves.obj", "--visual", self.folder / "leaves-looks"))
-        self.assertLess(looks["looks"][0]["delta_e_worst"], 2.5)
+        look = self.look_at("leaves.obj")
+        self.assertLess(look["delta_e_worst"], 2.5)
 
     def test_what_is_cut_out_is_looked_at_and_what_is_seen_through_is_not(self):
         # Right half clear, left half full: there or not. Then faint all over.
@@ -221,11 +227,8 @@ class Check(ProgramTest):
             (self.folder / f"{name}.mtl").write_text(f"newmtl m\nmap_Kd {name}.png\n")
             (self.folder / f"{name}.obj").write_text(
                 f"mtllib {name}.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0.2\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n")
-            path = self.folder / f"{name}.modar"
-            done = self.modar("bake", "--model", f"{name}.obj", "-o", path, "--quiet")
-            self.assertEqual(done.returncode, 0, done.stderr)
-            looks = json.loads(self.check(0, path, "--json", "--source", f"{name}.obj", "--visual", self.folder / f"{name}-looks"))["looks"]
-            self.assertEqual([look["judged"] for look in looks], [name == "fence"])
+            look = self.look_at(f"{name}.obj")
+            self.assertEqual(look["judged"], name == "fence")
 
     def test_light_changes_across_large_faces_as_on_the_device(self):
         # A cube of 8 vertices, whose normals are those of a ball; its highlight has the light's colour.
@@ -234,11 +237,8 @@ class Check(ProgramTest):
             f"v {x} {y} {z}\nvn {x} {y} {z}\n" for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)) + "usemtl m\n" + "".join(
             "f " + " ".join(f"{k}//{k}" for k in face) + "\n" for face in
             ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))))
-        path = self.folder / "cube.modar"
-        done = self.modar("bake", "--model", "cube.obj", "-o", path, "--quiet")
-        self.assertEqual(done.returncode, 0, done.stderr)
-        looks = json.loads(self.check(0, path, "--json", "--source", "cube.obj", "--visual", self.folder / "cube-looks"))
-        self.assertLess(looks["looks"][0]["delta_e_worst"], 3)
+        look = self.look_at("cube.obj")
+        self.assertLess(look["delta_e_worst"], 3)
 
     def test_white_marks_do_not_colour_what_black_plastic_reflects(self):
         # By the mean of the texture in linear light, this ball is off by 6.3.
@@ -254,11 +254,8 @@ class Check(ProgramTest):
             for k in range(1, (columns + 1) * rows + 1):
                 if k % (columns + 1):
                     file.write("f " + " ".join(f"{i}/{i}/{i}" for i in (k, k + 1, k + columns + 2, k + columns + 1)) + "\n")
-        path = self.folder / "ball.modar"
-        done = self.modar("bake", "--model", "ball.obj", "-o", path, "--quiet")
-        self.assertEqual(done.returncode, 0, done.stderr)
-        looks = json.loads(self.check(0, path, "--json", "--source", "ball.obj", "--visual", self.folder / "ball-looks"))
-        self.assertLess(looks["looks"][0]["delta_e_worst"], 4)
+        look = self.look_at("ball.obj")
+        self.assertLess(look["delta_e_worst"], 4)
 
     def test_sheets_are_looked_at(self):
         # Flat, and seen from both sides: some of the 12 views see its back, and some hardly more than its edge.
@@ -277,11 +274,8 @@ class Check(ProgramTest):
             "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 80, "byteLength": 12},
                             {"buffer": 0, "byteOffset": 48, "byteLength": 32}],
             "buffers": [{"uri": "sheet.bin", "byteLength": 92}]}))
-        path = self.folder / "sheet.modar"
-        done = self.modar("bake", "--model", "sheet.gltf", "-o", path, "--quiet")
-        self.assertEqual(done.returncode, 0, done.stderr)
-        looks = json.loads(self.check(0, path, "--json", "--source", "sheet.gltf", "--visual", self.folder / "sheet-looks"))
-        self.assertGreater(looks["looks"][0]["ssim_worst"], 0.9)
+        look = self.look_at("sheet.gltf")
+        self.assertGreater(look["ssim_worst"], 0.9)
 
     def test_rough_models_are_looked_at_in_many_samples(self):
         # Where every sample falls on another triangle, pictures of 16 samples a pixel differ by 2.75 of 255.
@@ -292,11 +286,8 @@ class Check(ProgramTest):
             for i in range(1, side * (side - 1)):
                 if i % side:
                     file.write(f"f {i} {i + 1} {i + side + 1} {i + side}\n")
-        path = self.folder / "rough.modar"
-        done = self.modar("bake", "--model", "rough.obj", "-o", path, "--quiet")
-        self.assertEqual(done.returncode, 0, done.stderr)
-        looks = json.loads(self.check(0, path, "--json", "--source", "rough.obj", "--visual", self.folder / "rough-looks"))
-        levels = looks["looks"][0]["levels"]
+        look = self.look_at("rough.obj")
+        levels = look["levels"]
         self.assertGreater(levels[0]["side_px"], 5)
         self.assertLess(max(level["difference_p99"] for level in levels), 2)
 
