@@ -2,16 +2,14 @@
 #include "bake/export/extract.hpp"
 
 #include <algorithm>
-#include <filesystem>
 #include <string_view>
-#include <system_error>
 
 #include "bake/export/model_file.hpp"
 #include "bake/export/room_models.hpp"
 #include "bake/export/texture_files.hpp"
+#include "bake/io/input.hpp"
 #include "bake/io/output.hpp"
 #include "bake/texture/texture_codec.hpp"
-#include "formats/base/atomic_file.hpp"
 
 namespace modar {
 namespace {
@@ -34,33 +32,40 @@ TextureFormat format_of(const TextureRecord& texture) {
 /// Collects what was written, and keeps names apart that clean to the same file.
 class Extraction {
  public:
-  Extraction(const BundleView& bundle, std::string folder)
-      : bundle_(bundle), folder_(std::move(folder)) {}
+  Extraction(const BundleView& bundle, OutputFolder& folder) : bundle_(bundle), folder_(folder) {}
 
   Result<void> textures();
   Result<void> patterns();
   Result<void> models();
-  std::vector<std::string> take_files() { return std::move(files_); }
+  /// Paths of what was written.
+  [[nodiscard]] std::vector<std::string> paths() const;
 
  private:
-  /// A path in the folder that was not written before.
-  std::string path_for(const std::string& stem, const std::string& extension);
+  /// Under a name that no file before it has.
+  Result<void> write(const std::string& stem, const std::string& extension,
+                     std::span<const std::byte> bytes);
   std::span<const std::byte> plane(std::uint32_t texture, const TextureLevelRecord& level,
                                    bool alpha) const;
 
   const BundleView& bundle_;
-  std::string folder_;
+  OutputFolder& folder_;
   std::vector<std::string> files_;
 };
 
-std::string Extraction::path_for(const std::string& stem, const std::string& extension) {
-  const std::filesystem::path folder(folder_);
-  std::string path = folder / (stem + extension);
-  for (int copy = 2; std::find(files_.begin(), files_.end(), path) != files_.end(); ++copy) {
-    path = folder / (stem + "-" + std::to_string(copy) + extension);
+Result<void> Extraction::write(const std::string& stem, const std::string& extension,
+                               std::span<const std::byte> bytes) {
+  std::string name = stem + extension;
+  for (int copy = 2; std::find(files_.begin(), files_.end(), name) != files_.end(); ++copy) {
+    name = stem + "-" + std::to_string(copy) + extension;
   }
-  files_.push_back(path);
-  return path;
+  files_.push_back(name);
+  return folder_.write(name, bytes);
+}
+
+std::vector<std::string> Extraction::paths() const {
+  std::vector<std::string> paths;
+  for (const std::string& name : files_) paths.push_back(folder_.path(name));
+  return paths;
 }
 
 std::span<const std::byte> Extraction::plane(std::uint32_t texture, const TextureLevelRecord& level,
@@ -81,15 +86,10 @@ Result<void> Extraction::textures() {
         if (format_of(texture) != TextureFormat::kEtc1Rgb) continue;  // all that PKM holds
         if (alpha && (texture.flags & kTextureAlpha) == 0) continue;
         const std::string name = stem + (alpha ? ".alpha." : ".") + std::to_string(l);
-        const auto written = write_file(
-            path_for(name, ".pkm"),
-            std::span<const std::byte>(to_pkm(plane(t, level, alpha), level.width, level.height)));
-        if (!written) return written;
+        MODAR_TRY(write(name, ".pkm", to_pkm(plane(t, level, alpha), level.width, level.height)));
       }
     }
-    const auto written = write_file(path_for(stem, ".ktx"),
-                                    std::span<const std::byte>(to_ktx(format_of(texture), levels)));
-    if (!written) return written;
+    MODAR_TRY(write(stem, ".ktx", to_ktx(format_of(texture), levels)));
   }
   return {};
 }
@@ -102,7 +102,7 @@ Result<void> Extraction::patterns() {
       const std::string_view yml = bundle_.feature_yml(p, set.id);
       if (yml.empty()) continue;
       const std::string name = stem + "." + clean_name(bundle_.name(set.name));
-      if (auto written = write_file(path_for(name, ".yml"), yml); !written) return written;
+      MODAR_TRY(write(name, ".yml", std::as_bytes(std::span(yml))));
     }
   }
   return {};
@@ -112,16 +112,16 @@ Result<void> Extraction::models() {
   const std::vector<GlbImage> images = decoded_textures(bundle_);
   for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
     const std::string stem = clean_name(bundle_.name(bundle_.models()[m].name));
-    if (auto written = write_glb(bundle_, m, images, path_for(stem, ".glb")); !written) {
-      return written;
-    }
+    const auto file = encode_glb(bundle_, m, images);
+    if (!file) return in_file(stem + ".glb", file.error());
+    MODAR_TRY(write(stem, ".glb", *file));
   }
   for (std::uint32_t p = 0; p < bundle_.patterns().size(); ++p) {
     const std::vector<RoomModel> placed = models_in_room(bundle_, p);
     if (placed.empty()) continue;
     const std::string stem = clean_name(bundle_.name(bundle_.patterns()[p].name));
     MODAR_ASSIGN(const auto file, encode_usdz(bundle_, placed, images));
-    MODAR_TRY(write_file(path_for(stem, ".usdz"), std::span<const std::byte>(file)));
+    MODAR_TRY(write(stem, ".usdz", file));
   }
   return {};
 }
@@ -130,12 +130,13 @@ Result<void> Extraction::models() {
 
 Result<std::vector<std::string>> extract_bundle(const BundleView& bundle, const std::string& folder,
                                                 bool force) {
-  MODAR_TRY(claim_output_folder(folder, force));
-  Extraction extraction(bundle, folder);
+  MODAR_ASSIGN(OutputFolder output, OutputFolder::claim(folder, force));
+  Extraction extraction(bundle, output);
   for (const auto& step : {&Extraction::models, &Extraction::textures, &Extraction::patterns}) {
-    if (auto done = (extraction.*step)(); !done) return tl::unexpected(done.error());
+    MODAR_TRY((extraction.*step)());
   }
-  return extraction.take_files();
+  MODAR_TRY(output.commit());
+  return extraction.paths();
 }
 
 }  // namespace modar

@@ -9,7 +9,6 @@
 
 #include "bake/import/gltf/tinygltf_library.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
-#include "formats/base/atomic_file.hpp"
 #include "formats/base/colour.hpp"
 #include "formats/texture_format.hpp"
 
@@ -285,19 +284,14 @@ Result<std::vector<std::byte>> encode_glb(const BundleView& bundle,
   });
 }
 
-Result<void> write_glb(const BundleView& bundle, std::uint32_t model,
-                       std::span<const GlbImage> images, const std::string& path) {
-  auto file = guarded_build(bundle, [&](GlbBuilder& builder) {
+Result<std::vector<std::byte>> encode_glb(const BundleView& bundle, std::uint32_t model,
+                                          std::span<const GlbImage> images) {
+  return guarded_build(bundle, [&](GlbBuilder& builder) {
     const ModelRecord& record = bundle.models()[model];
     tinygltf::Node node;
     node.translation = {record.center[0], record.center[1], record.center[2]};
     return builder.add_model(model, images, record.scale, std::move(node));
   });
-  if (!file) {
-    file.error().where = path;
-    return tl::unexpected(file.error());
-  }
-  return write_file(path, std::span<const std::byte>(*file));
 }
 
 }  // namespace modar

@@ -49,13 +49,13 @@ double roughness_of(float shininess);
 /// Whether any material of the model shows the texture.
 bool shows_texture(const BundleView& bundle, const ModelRecord& model, std::uint32_t texture);
 
-/// Writes level 0 of a model: one primitive a chunk, positions in source units (about the model's
+/// Level 0 of a model: one primitive a chunk, positions in source units (about the model's
 /// centre, which is the node's translation, so that large coordinates keep their digits in floats),
 /// normals, uv and colours as they decode, materials, textures as PNG.
 /// images: may lack textures; their materials then have their colour alone.
-/// Errors: those of decode_level(); kUnsupported "glb.too-large" beyond 4 GB; kIo.
-Result<void> write_glb(const BundleView& bundle, std::uint32_t model,
-                       std::span<const GlbImage> images, const std::string& path);
+/// Errors: those of decode_level(); kUnsupported "glb.too-large" beyond 4 GB.
+Result<std::vector<std::byte>> encode_glb(const BundleView& bundle, std::uint32_t model,
+                                          std::span<const GlbImage> images);
 
 /// The same of models that stand together, in the space that their places lead to.
 Result<std::vector<std::byte>> encode_glb(const BundleView& bundle,

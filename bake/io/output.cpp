@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <system_error>
+#include <utility>
 
 #include "bake/io/input.hpp"
 #include "bake/io/terminal.hpp"
@@ -32,17 +33,61 @@ Result<void> make_output_folder(const std::string& folder) {
   return {};
 }
 
-Result<void> claim_output_folder(const std::string& folder, bool force) {
-  const fs::path mark = fs::path(folder) / kFolderMark;
+OutputFolder::OutputFolder(std::string folder, bool made)
+    : folder_(std::move(folder)),
+      staging_(path(".modar-" + std::to_string(::getpid()))),
+      made_(made) {}
+
+OutputFolder::OutputFolder(OutputFolder&& other) noexcept
+    : folder_(std::move(other.folder_)),
+      staging_(std::exchange(other.staging_, std::string())),
+      made_(other.made_),
+      names_(std::move(other.names_)) {}
+
+OutputFolder::~OutputFolder() {
+  std::error_code ignored;
+  if (!staging_.empty()) fs::remove_all(staging_, ignored);
+  if (!staging_.empty() && made_) fs::remove(folder_, ignored);
+}
+
+Result<OutputFolder> OutputFolder::claim(const std::string& folder, bool force) {
   std::error_code error;
-  const bool empty = !fs::exists(folder, error) || fs::is_empty(folder, error);
-  if (!error && !empty && !force && !fs::exists(mark, error)) {
+  const bool there = fs::exists(folder, error);
+  const bool empty = !there || fs::is_empty(folder, error);
+  if (!error && !empty && !force && !fs::exists(fs::path(folder) / kFolderMark, error)) {
     return fail(ExitCode::kUsage, "out.foreign-folder", folder,
                 "the folder contains files that modar has not written",
                 "name a new or an empty folder, or write into this one with --force");
   }
   MODAR_TRY(make_output_folder(folder));
-  return write_file(mark.string(), "Files of this folder were written by modar.\n");
+  OutputFolder output(folder, !there);
+  constexpr std::string_view kMark = "Files of this folder were written by modar.\n";
+  MODAR_TRY(output.write(kFolderMark, std::as_bytes(std::span(kMark))));
+  return output;
+}
+
+Result<void> OutputFolder::write(const std::string& name, std::span<const std::byte> bytes) {
+  const fs::path file = fs::path(staging_) / name;
+  MODAR_TRY(make_output_folder(file.parent_path().string()));
+  names_.push_back(name);
+  auto written = write_file(file.string(), bytes);
+  if (!written) written.error().where = path(name);
+  return written;
+}
+
+Result<void> OutputFolder::commit() {
+  for (const std::string& name : names_) {
+    MODAR_TRY(make_output_folder(fs::path(path(name)).parent_path().string()));
+    std::error_code error;
+    fs::rename(staging_ + "/" + name, path(name), error);
+    if (error) {
+      return fail(ExitCode::kIo, "io.commit", path(name), "cannot be replaced: " + error.message(),
+                  "check that the folder may be written");
+    }
+  }
+  std::error_code ignored;
+  fs::remove_all(std::exchange(staging_, std::string()), ignored);
+  return {};
 }
 
 Result<void> keep_inputs(const std::string& output, const std::vector<std::string>& inputs) {

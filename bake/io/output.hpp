@@ -1,9 +1,11 @@
 // What commands do before they work: see that what they will write can be written, and destroys
-// nothing that they read.
+// nothing that they read; and folders of files that are written whole.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,10 +17,33 @@ namespace modar {
 /// Makes the folder and those above it where they are missing. Errors: kIo "io.folder".
 Result<void> make_output_folder(const std::string& folder);
 
-/// Makes a folder in which files are written, and replaced the next time. One that holds files and
-/// no mark of an earlier run is refused unless `force` is set: somebody may have named a web
-/// server's root. Errors: kUsage "out.foreign-folder", kIo "io.folder".
-Result<void> claim_output_folder(const std::string& folder, bool force);
+/// A folder of files that are written together: all of them, or none where one fails.
+class OutputFolder {
+ public:
+  /// Makes the folder where it is missing. One that holds files and no mark of an earlier run is
+  /// refused unless `force` is set: somebody may have named a web server's root.
+  /// Errors: kUsage "out.foreign-folder", kIo "io.folder".
+  static Result<OutputFolder> claim(const std::string& folder, bool force);
+  OutputFolder(OutputFolder&& other) noexcept;
+  OutputFolder& operator=(OutputFolder&&) = delete;
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+  /// Without commit(), what was written goes, and the folder if claim() made it.
+  ~OutputFolder();
+
+  /// name: a path within the folder. Errors: kIo "io.folder", "io.write".
+  Result<void> write(const std::string& name, std::span<const std::byte> bytes);
+  /// Puts the files in their places, in the order of their writing. Errors: kIo "io.commit".
+  Result<void> commit();
+  [[nodiscard]] std::string path(const std::string& name) const { return folder_ + "/" + name; }
+
+ private:
+  OutputFolder(std::string folder, bool made);
+  std::string folder_;
+  std::string staging_;  ///< a folder within it; empty: nothing is to be done any more
+  bool made_ = false;
+  std::vector<std::string> names_;
+};
 
 /// Refuses an output that is one of the inputs: by its path, a symbolic link or a hard link.
 /// Errors: kUsage "out.input".

@@ -17,7 +17,6 @@
 #include "bake/web/packed_bundle.hpp"
 #include "bake/web/page_texts.hpp"
 #include "bake/web/statement.hpp"
-#include "formats/base/atomic_file.hpp"
 #include "formats/base/html.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
@@ -76,6 +75,7 @@ struct Draft {
   std::vector<std::string> kept;      ///< what sw.js keeps: addresses of the files
   Json undescribed = Json::object();  ///< {LANGUAGE: [titles of patterns without an `alt`]}
   Site site;
+  std::optional<OutputFolder> output;
 };
 
 /// FNV-1a: enough to tell one version of a site from the next.
@@ -92,10 +92,10 @@ bool holds(const std::string& path, std::span<const std::byte> bytes) {
 
 /// A file that the service worker does not keep.
 Result<void> put_online(Draft& draft, const std::string& name, std::span<const std::byte> bytes) {
-  const std::string path = draft.options.output + "/" + name;
   // A phone waits for the page to be written again: most of its files stay, and syncing each to the
   // disk takes longer than all else.
-  if (!draft.options.live || !holds(path, bytes)) MODAR_TRY(write_file(path, bytes));
+  if (!draft.options.live || !holds(draft.output->path(name), bytes))
+    MODAR_TRY(draft.output->write(name, bytes));
   add_to_hash(draft.hash, std::as_bytes(std::span(name)));
   add_to_hash(draft.hash, bytes);
   draft.site.files.push_back(name);
@@ -503,7 +503,7 @@ Result<std::string> find_page() {
 }
 
 Result<Site> write_site(const SiteOptions& options) {
-  Draft draft{options, options.page, {}, {}, 0, 14695981039346656037u, {}, Json::object(), {}};
+  Draft draft{options, options.page, {}, {}, 0, 14695981039346656037u, {}, Json::object(), {}, {}};
   if (draft.page.empty()) {
     MODAR_ASSIGN(draft.page, find_page());
   }
@@ -516,10 +516,8 @@ Result<Site> write_site(const SiteOptions& options) {
     MODAR_ASSIGN(publisher, read_publisher(options.statement));
   }
   for (const std::string& path : options.bundles) MODAR_TRY(check_bundle_file(path));
-  MODAR_TRY(claim_output_folder(options.output, options.force));
-  for (const char* folder : {"/bundles", "/patterns", "/words"}) {
-    MODAR_TRY(make_output_folder(options.output + folder));
-  }
+  MODAR_ASSIGN(OutputFolder output, OutputFolder::claim(options.output, options.force));
+  draft.output.emplace(std::move(output));
   std::vector<std::string> names;
   Json bundles = Json::array();
   for (const std::string& path : options.bundles) {
@@ -544,6 +542,7 @@ Result<Site> write_site(const SiteOptions& options) {
   MODAR_TRY(put(draft, "site.json", site.dump()));
   MODAR_TRY(put_page(draft));
   MODAR_TRY(put_entry(draft, title));
+  MODAR_TRY(draft.output->commit());
   return draft.site;
 }
 

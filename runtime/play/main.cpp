@@ -106,9 +106,6 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
       {info, set, name, plan.camera.value_or(Camera{}), &spot, options.live ? &live : nullptr}));
   if (!options.record.empty() || plan.golden) track = with_gray_of_rgb(std::move(track));
   if (plan.golden) player.compare(std::move(*plan.golden));
-  if (bundle.scenes().empty() && bundle.nodes().empty() && !options.quiet) {
-    std::fprintf(stderr, "modar-play: nothing stands on a pattern of the bundle\n");
-  }
 
   PipelineOptions how;
   how.paced = options.realtime && !info.live;

@@ -203,7 +203,8 @@ Tracking:
   --extended          learn the static surroundings of a pattern, and go on while the pattern is
                       covered or out of view
   --smooth MS         steady models at rest, which may lag by this much (default: 0, off)
-  --outline           draw the outline of each visible pattern (amber while it is extended)
+  --outline           draw the outline of each visible pattern (amber while it is extended), as is
+                      done where nothing stands on any
 )";
   constexpr const char* kMore =
       R"(  --gyro FILE         with --extended: rotations of the camera, one line per frame with the rotation

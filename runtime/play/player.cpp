@@ -62,6 +62,11 @@ const std::string& input_of(const PlayOptions& options) {
   return options.golden.empty() ? options.input : options.golden;
 }
 
+/// Of its patterns only outlines can be drawn.
+bool is_bare(const BundleView& bundle) {
+  return bundle.scenes().empty() && bundle.nodes().empty();
+}
+
 }  // namespace
 
 bool was_interrupted() {
@@ -80,7 +85,7 @@ Player::Player(const PlayOptions& options, const BundleView& bundle)
       names_(pattern_names(bundle)),
       hysteresis_(names_.size(), options.method != "paper"),
       smoother_(names_.size(), options.smooth_ms),
-      controls_(bundle, options.outline, options.osd || options.window),
+      controls_(bundle, options.outline || is_bare(bundle), options.osd || options.window),
       progress_(!options.quiet) {
   items_.reserve(
       std::max(bundle.scenes().size() + bundle.nodes().size(), bundle.patterns().size()));
@@ -88,6 +93,10 @@ Player::Player(const PlayOptions& options, const BundleView& bundle)
 
 Result<void> Player::open(const PlayerSetup& setup) {
   setup_ = setup;
+  if (is_bare(bundle_) && !options_.quiet) {
+    std::fputs("modar-play: nothing stands on a pattern of the bundle; outlines are drawn\n",
+               stderr);
+  }
   MODAR_ASSIGN(auto screen, Screen::open(bundle_, options_));
   screen_ = std::move(screen);
   open_media();

@@ -162,13 +162,27 @@ class Outputs(ProgramTest):
         earlier = self.bake_demo("earlier.modar").read_bytes()
         bundle.write_bytes(earlier)
         (self.folder / "earlier.modar").unlink()
-        # A limit on the size of files, with its signal ignored: writes beyond it fail as on a full disk.
-        done = subprocess.run(["sh", "-c", 'trap "" XFSZ; ulimit -f 40; exec "$@"', "sh", str(BIN / "modar"), "bake",
-                               "--model", str(POTTERY), "--no-lods", "-o", str(bundle), "--quiet"],
-                              capture_output=True, text=True)
-        self.assert_fails(done, 2, "out.modar")
+        self.assert_fails(self.on_full_disk(40, "bake", "--model", POTTERY, "--no-lods", "-o", bundle, "--quiet"), 2, "out.modar")
         self.assertEqual(bundle.read_bytes(), earlier)
         self.assertEqual([p.name for p in self.folder.iterdir()], ["out.modar"])
+
+    def test_a_full_disk_leaves_no_part_of_a_folder(self):
+        bundle = self.bake_demo()
+        out = self.folder / "out"
+        blocks = 200  # of 512 bytes: less than the largest file
+        for words in (["inspect", bundle, "--extract", out], ["web", bundle, "-o", out, "--page", ROOT / "runtime/web"]):
+            self.assert_fails(self.on_full_disk(blocks, *words), 2, "out/")
+            self.assertFalse(out.exists(), words)
+        self.assertEqual(self.modar("inspect", bundle, "--extract", out).returncode, 0)
+        self.assertGreater(max(p.stat().st_size for p in out.iterdir()), 512 * blocks)
+        before = {p.name: p.stat().st_mtime_ns for p in out.iterdir()}
+        self.assert_fails(self.on_full_disk(blocks, "inspect", bundle, "--extract", out), 2, "out/")
+        self.assertEqual({p.name: p.stat().st_mtime_ns for p in out.iterdir()}, before)
+
+    def on_full_disk(self, blocks, *words):
+        """A limit on the size of files, with its signal ignored: writes beyond it fail as on a full disk."""
+        return subprocess.run(["sh", "-c", f'trap "" XFSZ; ulimit -f {blocks}; exec "$@"', "sh", str(BIN / "modar"), *map(str, words)],
+                              capture_output=True, text=True)
 
     def test_rectify_writes_png_only(self):
         done = self.modar("pattern", "rectify", COVER, "--corners", "10,10,300,40,310,600,20,650", "-o", "x.jpg")

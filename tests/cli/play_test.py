@@ -102,6 +102,21 @@ class Play(ProgramTest):
         other = self.play(bundle, "--golden", "kept", "--quiet", "--parameters", "orb-500", "--tolerance", "0")
         self.assertEqual(other.returncode, 10, other.stdout + other.stderr)
 
+    def test_a_pattern_with_nothing_on_it_is_outlined(self):
+        done = self.modar("bake", "--pattern", COVER, "-o", "bare.modar", "--quiet", "--parameters", "none", *QUICK)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = self.play("bare.modar", "--input", self.clip(3), "--json", "--out", "pictures")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        *_, last, _ = lines_of(done)
+        corners = last["visible"][0]["corners"]
+        sys.path.insert(0, str(ROOT / "assets"))
+        from kit import png
+        picture = png.read(self.folder / "pictures" / f"frame_{last['frame']:06}.png")
+        for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1]):
+            at = 3 * (round((ay + by) / 2) * picture.width + round((ax + bx) / 2))
+            red, green, blue = picture.pixels[at:at + 3]
+            self.assertGreater(green, 80 + max(red, blue), f"the middle of a side, {corners}")
+
     def test_a_bundle_that_is_replaced_is_played_on(self):
         bundle = self.bake_demo()
         sys.path.insert(0, str(ROOT / "assets"))
