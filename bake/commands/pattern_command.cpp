@@ -103,7 +103,7 @@ Result<void> take_corners(RectifyCommand& command, const RgbaImage& photo) {
                corners_text(found.corners).c_str(), command.picture.c_str());
   const char* doubt = found.sharpness < kDoubtfulSharpness ? "an edge is hidden or blurred"
                       : found.framed
-                          ? "there is another edge around them, perhaps that of the sheet"
+                          ? "there are edges around or beyond them, perhaps those of the sheet"
                       : found.fills ? "they fill the photo, which may already be the picture"
                                     : nullptr;
   command.doubtful = doubt != nullptr;

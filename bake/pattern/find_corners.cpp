@@ -46,6 +46,9 @@ constexpr double kLeastSharp = 0.6;
 // Of a figure around the one that was chosen, which makes that doubtful.
 constexpr double kSheetSupport = 0.6;
 constexpr double kSheetLeast = 1.04;
+// Pixels beyond a corner in which edges that go on are looked for.
+constexpr double kBeyondFrom = 4;
+constexpr double kBeyondTo = 24;
 // Share of a photo from which on it may be the picture, and what was found in it a printed frame.
 constexpr double kFilled = 0.8;
 
@@ -424,6 +427,22 @@ bool framed(const std::vector<Figure>& figures, const std::array<Point, 4>& corn
   });
 }
 
+/// Whether the two edges that end at a side go on beyond it, as those of a longer thing do.
+bool goes_on(const Gradients& gradients, const std::array<Point, 4>& corners) {
+  const auto beyond = [&](const Point& from, const Point& corner) {
+    const Point along = (corner - from) / norm_of(corner - from);
+    return sharp_along(gradients, corner + kBeyondFrom * along, corner + kBeyondTo * along);
+  };
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Point& one = corners[i];
+    const Point& other = corners[(i + 1) % 4];
+    if (beyond(corners[(i + 3) % 4], one) > kSheetSupport &&
+        beyond(corners[(i + 2) % 4], other) > kSheetSupport)
+      return true;
+  }
+  return false;
+}
+
 /// Printed frames lie within a thing's own edges: the largest figure around the best one that
 /// stands out nearly as well.
 const Figure& outermost(const std::vector<Figure>& figures) {
@@ -496,8 +515,8 @@ Result<FoundCorners> search(const RgbaImage& photo) {
   found.sharpness = least_sharp(gradients, corners);
   if (found.sharpness < kLeastSharp)
     return not_found("no four-sided figure stands out sharply in the photo");
-  found.framed = framed(figures, corners);
   found.fills = area_of(corners) > kFilled * small.cols * small.rows;
+  found.framed = framed(figures, corners) || (!found.fills && goes_on(gradients, corners));
   for (Point& corner : corners) corner = (corner + Point(0.5, 0.5)) * scale - Point(0.5, 0.5);
   corners = refine(Gradients(rgb), corners, {1.2 * scale, 1.2, 1.2});
   for (std::size_t i = 0; i < 4; ++i) found.corners[i] = {corners[i].x, corners[i].y};

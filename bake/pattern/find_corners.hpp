@@ -17,7 +17,8 @@ struct FoundCorners {
   /// Share of the weakest side where the edge is sharp, 0 to 1; below kDoubtfulSharpness the figure
   /// may be another thing's, or a corner is hidden.
   double sharpness = 0;
-  bool framed = false;  ///< another figure lies around it: what was found may be printed on that
+  bool framed = false;  ///< another figure lies around it, or two of its edges go on: it may be a
+                        ///< part of that
   bool fills = false;   ///< nearly all of the photo, which may be the picture itself
 };
 

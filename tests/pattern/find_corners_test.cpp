@@ -125,6 +125,18 @@ TEST(FindCorners, APhotoThatIsThePictureAlreadyIsDoubted) {
   EXPECT_TRUE(found->fills);
 }
 
+TEST(FindCorners, APartOfALongerThingIsDoubted) {
+  cv::Mat mural = asset("mural.png");
+  const cv::Mat board(mural.size(), CV_8UC3, cv::Scalar(20, 22, 24));
+  cv::hconcat(mural, board, mural);
+  const auto found = find_corners(as_photo(photograph(  // the board leaves the photo
+      mural, backdrop(""), {{{150, 150}, {1250, 120}, {1260, 560}, {140, 530}}})));
+  ASSERT_TRUE(found) << found.error().cause;
+  EXPECT_NEAR(found->corners[0].x, 150, 5);
+  EXPECT_LT(found->corners[1].x, 800);
+  EXPECT_TRUE(found->framed);
+}
+
 TEST(FindCorners, NothingThatStandsOutIsAnError) {
   const auto empty = find_corners(as_photo(backdrop("")));
   ASSERT_FALSE(empty);
