@@ -251,38 +251,23 @@ Result<double> max_error_of(const BakeRequest& request, const TriMesh& mesh) {
 /// triangles, which has 2 %, and one of 0.9 million, which has 7 %.
 constexpr double kVisibleError = 0.05;
 
-/// Mean length of the edges of level 0, source units; of every sixteenth triangle.
-double mean_edge(const ChunkedMesh& mesh) {
-  constexpr std::size_t kStep = 3 * 16;
-  double sum = 0;
-  std::size_t count = 0;
-  for (const Chunk& chunk : mesh.chunks) {
-    for (std::size_t i = 0; i + 2 < chunk.indices.size(); i += kStep, count += 3) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        sum += glm::length(mesh.mesh.positions[chunk.vertices[chunk.indices[i + k]]] -
-                           mesh.mesh.positions[chunk.vertices[chunk.indices[i + (k + 1) % 3]]]);
-      }
-    }
-  }
-  return count == 0 ? 0.0 : sum / static_cast<double>(count) * mesh.mesh.placement.scale;
-}
-
 /// Says how positions are stored where the user did not: floats, or half floats that 16-bit
 /// integers would be better than.
-void tell_positions(const ChunkedMesh& mesh, const PackedMesh& packed, PositionKind kind,
+void tell_positions(const ChunkedMesh& mesh, const PackedMesh& packed, const PositionPlan& plan,
                     const BakeRequest& request, Report& report) {
   char text[256];
   std::string cure;
-  if (kind == PositionKind::kFloat) {
+  if (plan.kind == PositionKind::kFloat) {
     std::snprintf(text, sizeof text,
                   "positions are stored as floats, %u bytes a vertex: no grid of 16-bit integers "
                   "is as fine as was asked and spans the longest triangle",
                   packed.layout.stride);
     cure = "a larger --max-error needs fewer bytes";
   } else {
-    const double edge = mean_edge(mesh);
+    const double edge = plan.mean_edge * mesh.mesh.placement.scale;
     const double error = packed.record.position_error_max;
-    if (kind != PositionKind::kHalf || request.positions || error <= kVisibleError * edge) return;
+    const bool chosen = plan.kind == PositionKind::kHalf && !request.positions;
+    if (!chosen || error <= kVisibleError * edge) return;
     const double step = make_grids(mesh, PositionKind::kInt16).front().step;
     std::snprintf(
         text, sizeof text,
@@ -368,7 +353,7 @@ Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& 
   // Smaller models are drawn whole, and chunks that share a range are drawn in one call.
   pack_options.prefixes = triangles_in(*chunked) > kDrawnWhole;
   MODAR_ASSIGN(shaped.model, pack(*chunked, texture_sides, pack_options, report));
-  tell_positions(*chunked, shaped.model, plan->kind, request, report);
+  tell_positions(*chunked, shaped.model, *plan, request, report);
   return shaped;
 }
 

@@ -134,7 +134,8 @@ constexpr BakeOption kOptions[] = {
      "as a length (2mm, with a unit)",
      kMaxError},
     {"--positions", "positions", "positions", Part::kModel, Group::kGeometry, "FORMAT", "int16",
-     "Position format; without it half, or int16 or float if the largest error requires it",
+     "Position format; without it half, or int16 or float if the largest error or a fine mesh "
+     "requires it",
      WordOption{
          kPositions,
          [](const BakeRequest& r) { return r.positions ? static_cast<int>(*r.positions) : -1; },

@@ -152,6 +152,43 @@ TEST(Positions, TheAskedErrorIsKept) {
   }
 }
 
+/// Two pieces of triangles that are as small as those of scans of buildings, at the ends of a
+/// model. cells: of a piece's side of 0.1; the pieces are 10 apart.
+TriMesh two_pieces(std::uint32_t cells) {
+  std::string text = "vn 0 0 1\n";
+  std::string faces;
+  for (std::uint32_t piece = 0; piece < 2; ++piece) {
+    for (std::uint32_t i = 0; i <= cells; ++i) {
+      for (std::uint32_t j = 0; j <= cells; ++j) {
+        const double x = 10.0 * piece + 0.1 * i / cells;
+        text += "v " + std::to_string(x) + " " + std::to_string(0.1 * j / cells) + " 0\n";
+        if (i == cells || j == cells) continue;
+        const std::uint32_t a = 1 + (piece * (cells + 1) + i) * (cells + 1) + j;
+        faces += "f " + std::to_string(a) + "//1 " + std::to_string(a + cells + 1) + "//1 " +
+                 std::to_string(a + 1) + "//1\n";
+      }
+    }
+  }
+  return welded(parse(text + faces));
+}
+
+TEST(Positions, FineTrianglesAreNotFolded) {
+  // Steps of half floats at the ends, 5 from the middle: 0.0025.
+  for (const auto& [cells, kind] :
+       {std::pair{4u, PositionKind::kHalf}, std::pair{64u, PositionKind::kInt16}}) {
+    const TriMesh mesh = two_pieces(cells);
+    const auto plan = plan_positions(mesh, {});
+    ASSERT_TRUE(plan);
+    EXPECT_EQ(plan->kind, kind) << cells;
+    EXPECT_EQ(plan_positions(mesh, {PositionKind::kHalf, 0.0})->kind, PositionKind::kHalf);
+    const ChunkedMesh split = chunked(mesh, 1000);
+    EXPECT_EQ(packed_as(split, plan->kind).record.triangle_count, 2 * cells * cells);
+    const bool folds =
+        packed_as(split, PositionKind::kHalf).record.triangle_count < 2 * cells * cells;
+    EXPECT_EQ(folds, kind == PositionKind::kInt16);
+  }
+}
+
 TEST(Positions, FloatsTakeWhatNoGridSpans) {
   // A floor of 200 units under a grid of small triangles, an error of a millionth of it.
   std::string text = grid(40, 1);

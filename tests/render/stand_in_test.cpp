@@ -41,7 +41,7 @@ void stand_in_for(BundleContent& content, std::uint32_t model, float error) {
 
 /// Model 0 is a blue rectangle without stand-ins, model 1 two red chunks beside each other, with a
 /// finer stand-in in two green chunks and a coarser one in one blue chunk.
-BundleContent two_models(float coarse = 0.1f) {
+BundleContent two_models(float coarse = 0.1f, float fine = 0.01f) {
   SceneMaker maker;
   maker.add_plain_model(Layout::kHalfColoured, rectangle(-0.5, 0.5, kBlue));
   const std::uint32_t material = maker.add_material(flat_material());
@@ -54,7 +54,7 @@ BundleContent two_models(float coarse = 0.1f) {
   left.insert(left.end(), left.begin(), left.begin() + 2);  // more to draw than its stand-in
   add({left, rectangle(0.0, 0.5, kRed)});
   add({rectangle(-0.5, 0.0, kGreen), rectangle(0.0, 0.5, kGreen)});
-  stand_in_for(maker.content, 1, 0.01f);
+  stand_in_for(maker.content, 1, fine);
   add({rectangle(-0.5, 0.5, kBlue)});
   stand_in_for(maker.content, 1, coarse);
   return maker.content;
@@ -134,6 +134,35 @@ TEST_F(StandInTest, TheFinestThatFitsTakesTheirPlace) {
   const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, caps);
   ASSERT_TRUE(renderer);
   EXPECT_EQ(colours(*renderer, 1.2), std::set<Rgb>{kGreen});
+}
+
+/// A scan of a building states an error in shading of thousands of pixels, and its chunks have
+/// millions of triangles: neither they nor parts of them are a picture that an old GPU draws.
+TEST_F(StandInTest, WhateverItsErrorItIsDrawnWhereChunksAreTooMany) {
+  BundleContent content = two_models(100.0f, 10.0f);
+  LevelRecord& level = content.levels[content.chunks[content.models[1].first_chunk].first_level];
+  const std::vector<std::byte> once(
+      content.indices.begin() + static_cast<std::ptrdiff_t>(level.index_offset),
+      content.indices.begin() +
+          static_cast<std::ptrdiff_t>(level.index_offset + 2 * level.index_count));
+  constexpr std::uint32_t kTimes = 40'000;  // of four triangles
+  content.models[1].triangle_count += (kTimes - 1) * level.index_count / 3;
+  level.index_offset = content.indices.size();
+  level.index_count *= kTimes;
+  for (std::uint32_t i = 0; i < kTimes; ++i) {
+    content.indices.insert(content.indices.end(), once.begin(), once.end());
+  }
+  const MappedBundle bundle(content);
+  ASSERT_TRUE(bundle.view);
+  GlCaps caps = probe_gl_caps();
+  caps.es3 = false;
+  for (const std::uint64_t memory : {std::uint64_t{0}, std::uint64_t{2 * level.index_count}}) {
+    caps.gpu_memory = memory;
+    const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, caps);
+    ASSERT_TRUE(renderer);
+    EXPECT_EQ(colours(*renderer, 1.2), std::set<Rgb>{kGreen}) << memory;
+    EXPECT_EQ(renderer->stats().triangles, 4u) << memory;
+  }
 }
 
 TEST_F(StandInTest, ItemsOfOtherModelsStayAsTheyAre) {

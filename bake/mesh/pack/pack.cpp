@@ -263,13 +263,14 @@ void fill_model_record(const ChunkedMesh& chunked, const PackOptions& options,
   record.material_count = static_cast<std::uint32_t>(mesh.materials.size());
 }
 
-void tell_collapsed(const std::string& name, std::size_t count, Report& report) {
+void tell_collapsed(const std::string& name, std::size_t count, PositionKind kind, Report& report) {
   if (count == 0) return;
-  report.diagnostics.push_back({"model.collapsed", DiagnosticSeverity::kInfo, name, 0,
-                                std::to_string(count) +
-                                    " triangles are smaller than the resolution of stored "
-                                    "positions and are left out",
-                                "--positions int16 or --max-error keeps more of them"});
+  report.diagnostics.push_back(
+      {"model.collapsed", DiagnosticSeverity::kInfo, name, 0,
+       std::to_string(count) + " triangles are smaller than the resolution of stored "
+                               "positions and are left out",
+       kind == PositionKind::kHalf ? "--positions int16 or --max-error keeps more of them"
+                                   : "--max-error keeps more of them"});
 }
 
 std::size_t index_count(const ChunkedMesh& chunked) {
@@ -335,7 +336,7 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
                 "all its triangles are smaller than the resolution of positions",
                 "bake it with --positions int16 or a --max-error");
   }
-  tell_collapsed(mesh.name, collapsed, report);
+  tell_collapsed(mesh.name, collapsed, options.positions, report);
   errors.write(mesh.placement.scale, out.record);
   timer.done(out.record.triangle_count, out.vertices.size() + out.indices.size(),
              out.record.position_error_max);

@@ -117,12 +117,36 @@ double longest_triangle(const TriMesh& mesh) {
   return longest;
 }
 
+/// Of the mean edge: half floats that may move vertices farther are not chosen. A triangle of equal
+/// sides is 0.87 of them high, and its ends come nearer by half a side at most, so that it keeps
+/// its area and its side. Of scans with 0.08, 0.11, 0.31 and 1.07 (a building of 14.6 million
+/// triangles), `modar bake --positions half --notes` leaves out 3 %, none, 0.4 % and 27 %.
+constexpr double kFoldingShare = 0.25;
+/// Half floats in [-1,1] move a coordinate by at most half a step of 2^-11.
+constexpr double kHalfError = kHalfDiagonal * 0x1p-11;
+
+/// Mean length of the edges of every sixteenth triangle, model space.
+double mean_edge_of(const TriMesh& mesh) {
+  constexpr std::size_t kStep = 16;
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += kStep, count += 3) {
+    const auto& corners = mesh.triangles[t];
+    for (std::size_t i = 0; i < 3; ++i) {
+      sum += glm::length(mesh.positions[corners[i]] - mesh.positions[corners[(i + 1) % 3]]);
+    }
+  }
+  return count == 0 ? 0.0 : sum / static_cast<double>(count);
+}
+
 }  // namespace
 
 Result<PositionPlan> plan_positions(const TriMesh& mesh, const PositionRequest& request) {
   PositionPlan plan;
+  plan.mean_edge = mean_edge_of(mesh);
   if (!(request.max_error > 0)) {
-    plan.kind = request.kind.value_or(PositionKind::kHalf);
+    const bool folds = kHalfError > kFoldingShare * plan.mean_edge;
+    plan.kind = request.kind.value_or(folds ? PositionKind::kInt16 : PositionKind::kHalf);
     return plan;
   }
   const double wanted = request.max_error / mesh.placement.scale;
@@ -139,7 +163,7 @@ Result<PositionPlan> plan_positions(const TriMesh& mesh, const PositionRequest& 
   const bool grid_holds = step >= kFinestStep && longest_triangle(mesh) <= plan.max_side;
   if (grid_holds) return plan;
   if (!request.kind && kFloatStep * kHalfDiagonal <= wanted) {
-    return PositionPlan{PositionKind::kFloat, 0.0};
+    return PositionPlan{PositionKind::kFloat, 0.0, plan.mean_edge};
   }
   if (request.kind) {
     return too_fine(mesh, request, "no grid of 16-bit integers that fine spans its triangles");

@@ -26,14 +26,16 @@ enum class PositionKind : std::uint8_t {
 
 /// What the user asks for.
 struct PositionRequest {
-  /// Unset: half floats where they are exact enough, else 16-bit integers, else floats.
+  /// Unset: half floats where they are exact enough and fold no triangles, else 16-bit integers,
+  /// else floats.
   std::optional<PositionKind> kind;
   double max_error = 0.0;  ///< source units; 0: no limit
 };
 
 struct PositionPlan {
   PositionKind kind = PositionKind::kHalf;
-  double max_side = 0.0;  ///< model space: longest side that a chunk may have; 0: no limit
+  double max_side = 0.0;   ///< model space: longest side that a chunk may have; 0: no limit
+  double mean_edge = 0.0;  ///< model space; of every sixteenth triangle
 };
 
 /// Errors: kUnsupported "model.max-error" where no layout, or not the requested one, is exact
