@@ -156,6 +156,53 @@ TEST_F(Relief, AColourShowsWhatTheRendererDrawsOfASurfaceThatLiesSo) {
   }
 }
 
+TEST_F(Relief, BrightensWhatHasNoPictureToo) {
+  const glm::dvec3 map = glm::normalize(glm::dvec3(-0.4, -0.3, 1));  // towards the lamp
+  ASSERT_TRUE(write_png(plain(4, 4, stored(map)), path("normal.png")));
+  const std::string kd = "Kd 0.5 0.5 0.5\n";
+  write_square("flat", kUpright, {0, 0, 1}, kd);
+  write_square("lies", kUpright, map, kd);
+  write_square("drawn", kUpright, {0, 0, 1}, kd + "norm normal.png\n");
+  const int wanted = seen("lies");
+  EXPECT_GT(wanted, seen("flat") + 4);
+  EXPECT_NEAR(seen("drawn"), wanted, 2);
+}
+
+TEST_F(Relief, ShadesWhatLiesBetweenVertices) {
+  // A map that is nearly flat on four normals that fan out, and as many squares as pixels.
+  ASSERT_TRUE(write_png(plain(64, 64, {129, 128, 255}), path("normal.png")));
+  const auto write_fan = [&](const std::string& name, int squares, const std::string& maps) {
+    std::string obj = "mtllib " + name + ".mtl\nusemtl m\n";
+    for (int i = 0; i < (squares + 1) * (squares + 1); ++i) {
+      const glm::dvec2 at = glm::dvec2(i % (squares + 1), i / (squares + 1)) / double(squares);
+      const glm::dvec2 p = 2.0 * at - 1.0;
+      const glm::dvec3 n = glm::normalize(glm::dvec3(p, 0.5));
+      for (const auto& [word, v] :
+           {std::pair("v", glm::dvec3(p, 0)), {"vt", glm::dvec3(at, 0)}, {"vn", n}}) {
+        obj += word + (" " + std::to_string(v.x)) + " " + std::to_string(v.y) + " " +
+               std::to_string(v.z) + "\n";
+      }
+    }
+    for (int i = 0; i < squares * squares; ++i) {
+      obj += "f";
+      const int first = 1 + i / squares * (squares + 1) + i % squares;
+      for (const int v : {first, first + 1, first + squares + 2, first + squares + 1}) {
+        const std::string text = std::to_string(v);
+        obj += " " + text + "/" + text + "/" + text;
+      }
+      obj += "\n";
+    }
+    write(name + ".obj", obj);
+    write(name + ".mtl", "newmtl m\nmap_Kd grey.png\n" + maps);
+  };
+  write_fan("fine", 64, "");
+  write_fan("coarse", 1, "");
+  write_fan("drawn", 1, "norm normal.png\n");
+  const int wanted = seen("fine");
+  EXPECT_GT(wanted, seen("coarse") + 10);
+  EXPECT_NEAR(seen("drawn"), wanted, 4);
+}
+
 TEST_F(Relief, ChangesAColourByThreeTenthsAtMost) {
   // Away from the lamp, which stands over -x, -y.
   const glm::dvec3 away = glm::normalize(glm::dvec3(1, 0.7, 0.2));

@@ -99,6 +99,12 @@ class NormalField {
     }
   }
 
+  /// Whether it looks straight on everywhere.
+  [[nodiscard]] bool flat() const {
+    return std::all_of(vectors_.begin(), vectors_.end(),
+                       [](const glm::vec3& v) { return v.x == 0 && v.y == 0; });
+  }
+
   /// Between its four neighbours; the map repeats.
   [[nodiscard]] glm::vec3 at(glm::dvec2 uv) const {
     const auto [x0, x1, fx] = neighbours(uv.x, width_);
@@ -341,19 +347,20 @@ class ReliefRows {
     glm::vec3 normal(0.0F);
     glm::vec3 tangent(0.0F);
     glm::dvec2 place(0.0);
+    float before = 0;  // the device shades vertices, and goes from one to the other in a line
     for (int i = 0; i < 3; ++i) {
       const std::uint32_t v = mesh_.triangles[triangle][static_cast<std::size_t>(i)];
       const auto weight = static_cast<float>(weights[i]);
       normal += weight * mesh_.normals[v];
       tangent += weight * tangents_.of[uv.mirrored() ? 0 : 1][v];
       place += weights[i] * uv.corners[static_cast<std::size_t>(i)];
+      before += weight * light_.factor(unit(mesh_.normals[v]));
     }
     const glm::vec3 map = field_.at(glm::dvec2(to_map_ * glm::dvec3(place, 1.0)));
     // Green points to the picture's top, where v is least.
     const glm::vec3 up = glm::cross(normal, tangent) * (uv.mirrored() ? -1.0F : 1.0F);
     const glm::vec3 turned = map.x * tangent + map.y * up + map.z * normal;
     const glm::vec3 straight = unit(normal);
-    const float before = light_.factor(straight);
     const float after = light_.factor(glm::dot(turned, turned) > 0 ? unit(turned) : straight);
     return before > 0 ? std::clamp(after / before, 1 - kMostRelief, 1 + kMostRelief) : 1.0F;
   }
@@ -451,11 +458,14 @@ class ReliefPainter {
   ReliefPainter(const TriMesh& mesh, const ReliefOptions& options)
       : mesh_(mesh), options_(options), light_(options.stands) {}
 
-  /// The picture, and false where it is what it was.
-  Result<bool> paint(const ReliefGroup& group, const Tangents& tangents, RgbaImage& image) const {
+  /// The picture, what colours are to be multiplied with beside it, and false where it is what it
+  /// was.
+  Result<bool> paint(const ReliefGroup& group, const Tangents& tangents, RgbaImage& image,
+                     float& headroom) const {
     MODAR_ASSIGN(const RgbaImage map, read_normals(group.normal));
     MODAR_ASSIGN(image, read_colours(group, map, options_));
     const NormalField field(map, spanned(map, group.normal, image), group.normal.scale);
+    if (field.flat()) return false;
     const std::vector<std::uint32_t> triangles = triangles_of(group);
     double repeats = 0;
     for (const std::uint32_t t : triangles) repeats += std::fabs(UvTriangle(mesh_, t).area2) / 2;
@@ -471,7 +481,7 @@ class ReliefPainter {
         rows.add(t, static_cast<std::uint32_t>(every), edge(band), edge(band + 1));
       }
     });
-    return apply(means_of(sums), image);
+    return apply(means_of(sums), image, headroom);
   }
 
  private:
@@ -485,13 +495,19 @@ class ReliefPainter {
     return triangles;
   }
 
-  static bool apply(const std::vector<float>& factors, RgbaImage& image) {
-    bool changed = false;
+  /// Brighter than white is what is multiplied beside the picture.
+  static bool apply(const std::vector<float>& factors, RgbaImage& image, float& headroom) {
+    float most = 255.0F;
+    const auto drawn = [&](std::size_t p) { return float(image.pixels[p]) * factors[p / 4]; };
+    for (std::size_t p = 0; p < image.pixels.size(); ++p) {
+      if (p % 4 != 3) most = std::max(most, drawn(p));
+    }
+    headroom = most / 255.0F;
+    bool changed = headroom > 1.0F;
     for (std::size_t p = 0; p < image.pixels.size(); ++p) {
       if (p % 4 == 3) continue;
       const std::uint8_t before = image.pixels[p];
-      const float value = std::min(255.0F, float(before) * factors[p / 4]);
-      image.pixels[p] = static_cast<std::uint8_t>(std::lround(value));
+      image.pixels[p] = static_cast<std::uint8_t>(std::lround(drawn(p) / headroom));
       changed = changed || image.pixels[p] != before;
     }
     return changed;
@@ -508,7 +524,8 @@ struct KeptPicture {
   std::shared_ptr<const void> before;
 };
 
-Result<void> keep_picture(const ReliefGroup& group, const RgbaImage& image, TriMesh& mesh) {
+Result<void> keep_picture(const ReliefGroup& group, const RgbaImage& image, float headroom,
+                          TriMesh& mesh) {
   const std::string& name = group.colour.empty() ? group.normal.path : group.colour;
   auto kept = std::make_shared<KeptPicture>();
   kept->before = mesh.materials[group.materials.front()].keeper;
@@ -516,6 +533,7 @@ Result<void> keep_picture(const ReliefGroup& group, const RgbaImage& image, TriM
   MODAR_TRY(write_png(image, path));
   for (const std::uint32_t m : group.materials) {
     mesh.materials[m].diffuse_map = path;
+    mesh.materials[m].diffuse *= headroom;
     mesh.materials[m].keeper = kept;
   }
   return {};
@@ -537,7 +555,8 @@ Result<void> draw_relief(TriMesh& mesh, const ReliefOptions& options, Report& re
   std::uint64_t texels = 0;
   for (const ReliefGroup& group : groups) {
     RgbaImage image;
-    const Result<bool> changed = painter.paint(group, tangents, image);
+    float headroom = 1.0F;
+    const Result<bool> changed = painter.paint(group, tangents, image, headroom);
     if (!changed) {
       // Where it is the colour, whoever reads it for the bundle says so.
       const Error& error = changed.error();
@@ -545,7 +564,7 @@ Result<void> draw_relief(TriMesh& mesh, const ReliefOptions& options, Report& re
       report.diagnostics.push_back(
           {error.code, DiagnosticSeverity::kWarning, error.where, 0, error.cause, error.cure});
     } else if (*changed) {
-      MODAR_TRY(keep_picture(group, image, mesh));
+      MODAR_TRY(keep_picture(group, image, headroom, mesh));
       drawn += group.materials.size();
       texels += std::uint64_t{image.width} * image.height;
     }
