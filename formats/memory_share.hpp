@@ -5,21 +5,22 @@
 #include <cstdint>
 
 #include "formats/bundle_view.hpp"
+#include "formats/texture_format.hpp"
 
 namespace modar {
 
-inline std::uint64_t texture_bytes(const BundleView& bundle) {
-  std::uint64_t bytes = 0;
-  for (std::uint32_t i = 0; i < bundle.textures().size(); ++i) {
-    bytes += bundle.texture_data(i).size();
-  }
-  return bytes;
+/// Bytes of a texture with all its levels on a device: decoded to RGB where the device does not
+/// read its blocks.
+inline std::uint64_t texture_bytes(const BundleView& bundle, std::uint32_t texture, bool reads) {
+  const std::uint64_t bytes = bundle.texture_data(texture).size();
+  const TextureFormatInfo& format = *find_texture_format(bundle.textures()[texture].format);
+  return reads ? bytes : bytes / format.block_bytes * format.block_side * format.block_side * 3;
 }
 
 /// Bytes of the budget that geometry may take: half, and what all textures leave of the other half.
-/// 0 stands for no limit.
-inline std::uint64_t geometry_share(const BundleView& bundle, std::uint64_t budget) {
-  return budget - std::min(budget / 2, texture_bytes(bundle));
+/// textures: their bytes on the device. A budget of 0 stands for no limit.
+inline std::uint64_t geometry_share(std::uint64_t textures, std::uint64_t budget) {
+  return budget - std::min(budget / 2, textures);
 }
 
 }  // namespace modar

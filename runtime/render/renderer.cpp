@@ -47,6 +47,15 @@ constexpr std::uint64_t kMostTriangles = 1'000'000;
 /// take a Mali-400 10 ms.
 constexpr std::uint64_t kFewTriangles = 104'000;
 
+std::uint64_t all_texture_bytes(const BundleView& bundle, const GlCaps& caps) {
+  std::uint64_t bytes = 0;
+  for (std::uint32_t i = 0; i < bundle.textures().size(); ++i) {
+    const auto format = static_cast<TextureFormat>(bundle.textures()[i].format);
+    bytes += texture_bytes(bundle, i, caps.reads(format));
+  }
+  return bytes;
+}
+
 std::vector<VertexFormat> vertex_formats(const BundleView& bundle, const GlCaps& caps) {
   std::vector<VertexFormat> formats;
   for (std::uint32_t i = 0; i < bundle.layouts().size(); ++i) {
@@ -141,7 +150,8 @@ struct Renderer::State {
       : bundle(view),
         caps(context_caps),
         formats(vertex_formats(bundle, caps)),
-        geometry(bundle, formats, geometry_share(view, context_caps.gpu_memory)),
+        texture_total(all_texture_bytes(view, caps)),
+        geometry(bundle, formats, geometry_share(texture_total, context_caps.gpu_memory)),
         textures(bundle, caps),
         painter(bundle, formats, batch_budget()) {
     estimator.create(bundle);
@@ -150,7 +160,7 @@ struct Renderer::State {
   /// What geometry and textures leave; nothing where not even they fit.
   std::uint64_t batch_budget() const {
     if (caps.gpu_memory == 0) return ~std::uint64_t{0};
-    const std::uint64_t used = geometry.total_bytes() + texture_bytes(bundle);
+    const std::uint64_t used = geometry.total_bytes() + texture_total;
     return caps.gpu_memory - std::min(caps.gpu_memory, used);
   }
 
@@ -369,6 +379,7 @@ struct Renderer::State {
   std::vector<VertexFormat> formats;
   GlExtensions extensions;
   GlState gl;
+  std::uint64_t texture_total;  ///< bytes of all textures, were all their levels in GL
   GeometryStore geometry;
   TextureStore textures;
   ModelPainter painter;

@@ -152,6 +152,36 @@ TEST_F(MemoryTest, TooSmallABudgetFallsBackToCoarseLevels) {
     EXPECT_EQ(pixels[static_cast<std::size_t>(32 * 96 + x) * 4 + 1], 100);
 }
 
+TEST_F(MemoryTest, DecodedTexturesLeaveGeometryWhatTheyDoNotTake) {
+  SceneMaker maker;
+  maker.content = tile_row(10, 12);
+  const std::vector<std::byte> blocks(256 * 8);
+  maker.content.materials[0].texture = maker.add_texture(64, {blocks}, {}, 0);
+  const MappedBundle bundle(maker.content);
+  ASSERT_TRUE(bundle.view);
+  for (const bool reads : {false, true}) {
+    GlCaps caps = probe_gl_caps();
+    caps.gpu_memory = 80000;
+    caps.texture_formats = reads ? caps.texture_formats : 0;
+    const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, caps);
+    ASSERT_TRUE(renderer);
+    if (!reads) {
+      EXPECT_EQ(renderer->gpu_memory().textures, 64u * 64 * 3);
+    }
+    RenderOptions options = flat_light();
+    options.lod_pixels = 0.1f;
+    renderer->set_options(options);
+    std::uint64_t most = 0;
+    for (double x = -0.9; x <= 0.9; x += 0.05) {
+      const DrawItem item = before(x);
+      draw(*renderer, default_camera(96, 64), {&item, 1});
+      most = std::max(most, renderer->gpu_memory().geometry + renderer->gpu_memory().textures);
+    }
+    EXPECT_LE(most, caps.gpu_memory) << reads;
+    EXPECT_GT(most, caps.gpu_memory / 2) << "nothing is filled: the test proves nothing";
+  }
+}
+
 TEST_F(MemoryTest, AFrameHasSoManyTriangles) {
   // A tile, each of its 288 triangles again and again: a million or so, more than 100,000.
   for (const auto& [times, fits, fits_small] :

@@ -57,9 +57,7 @@ class DeviceCheck {
     const TextureFormatInfo& format = *find_texture_format(texture.format);
     const bool reads = device_.es_version >= static_cast<int>(format.core_since) ||
                        device_.has_extension(format.gl_extension);
-    const std::uint64_t decoded =
-        bytes / format.block_bytes * format.block_side * format.block_side * kDecodedPixelBytes;
-    texture_bytes_ += reads ? bytes : decoded;
+    texture_bytes_ += texture_bytes(bundle_, index, reads);
     const TextureLevelRecord& smallest =
         bundle_.texture_levels()[texture.first_level + texture.level_count - 1];
     const std::uint64_t pixels = std::uint64_t{smallest.width} * smallest.height;
@@ -73,7 +71,8 @@ class DeviceCheck {
     }
     if (!reads) {
       tell(WorkstationRule::kDeviceEtc1, where, &texture.format,
-           std::to_string(bytes) + " bytes become " + std::to_string(decoded));
+           std::to_string(bytes) + " bytes become " +
+               std::to_string(texture_bytes(bundle_, index, false)));
     }
   }
 
@@ -159,7 +158,7 @@ class DeviceCheck {
     if (gpu > limit) {
       // The renderer keeps to the limit: it leaves out the largest mip levels, and what is nearest
       // gets its finest levels first.
-      const bool drawn = most_coarse_bytes_ <= geometry_share(bundle_, limit) &&
+      const bool drawn = most_coarse_bytes_ <= geometry_share(texture_bytes_, limit) &&
                          most_coarse_bytes_ + smallest_bytes_ <= limit;
       tell(drawn ? WorkstationRule::kDeviceGpuDetail : WorkstationRule::kDeviceGpuMemory,
            largest_asset(), first,
