@@ -117,17 +117,22 @@ inline __m128i four_values(const Digits& a, const Digits& b, const Digits& c, co
   return join_eights(join_fours(digit_lanes(a, b)), join_fours(digit_lanes(c, d)));
 }
 
-/// A decimal of a line: "-12.345678", with 1 to 7 digits on either side of the point, 8 in all.
+/// A decimal of a line: "-123.456789", with 1 to 8 digits on either side of the point, 9 in all.
 struct Decimal {
   const char* end;
-  unsigned digits;   ///< in all
+  unsigned digits;   ///< in all, 8 at most
   unsigned after;    ///< behind the point
   unsigned divisor;  ///< of kDivisors
+  unsigned lead;     ///< of kLeads
 };
 
+/// What a digit adds that stands before eight others.
+inline constexpr std::array<double, 10> kLeads = {0e8, 1e8, 2e8, 3e8, 4e8, 5e8, 6e8, 7e8, 8e8, 9e8};
+
 /// 10 to the power of n at 2 n, its negative at 2 n + 1: dividing by it gives the sign, of 0 too.
-inline constexpr std::array<double, 16> kDivisors = {1e0, -1e0, 1e1, -1e1, 1e2, -1e2, 1e3, -1e3,
-                                                     1e4, -1e4, 1e5, -1e5, 1e6, -1e6, 1e7, -1e7};
+inline constexpr std::array<double, 18> kDivisors = {1e0, -1e0, 1e1, -1e1, 1e2, -1e2,
+                                                     1e3, -1e3, 1e4, -1e4, 1e5, -1e5,
+                                                     1e6, -1e6, 1e7, -1e7, 1e8, -1e8};
 
 /// The digits of two decimals without the points; sets bytes of `bad` where they are none.
 inline __m128i decimal_lanes(const Decimal& low, const Decimal& high, __m128i& bad) {
@@ -146,7 +151,9 @@ inline __m128i decimal_lanes(const Decimal& low, const Decimal& high, __m128i& b
 /// division are exact, so the single rounding is correct (see take_plain_real()).
 inline __m128d decimal_pair(__m128i numbers, const Decimal& low, const Decimal& high) {
   const __m128i divisors = load_lanes(&kDivisors[low.divisor], &kDivisors[high.divisor]);
-  return _mm_div_pd(_mm_cvtepi32_pd(numbers), _mm_castsi128_pd(divisors));
+  const __m128i leads = load_lanes(&kLeads[low.lead], &kLeads[high.lead]);
+  const __m128d values = _mm_add_pd(_mm_cvtepi32_pd(numbers), _mm_castsi128_pd(leads));
+  return _mm_div_pd(values, _mm_castsi128_pd(divisors));
 }
 
 /// Computes two or three decimals; false where one of them is no number.
@@ -187,8 +194,12 @@ template <std::size_t kCount>
     const unsigned negative = p[begin] == '-' ? 1 : 0;
     const unsigned before = points[i] - begin - negative;
     const unsigned after = ends[i] - points[i] - 1;
-    excess |= (before - 1) | (after - 1) | (kMostDigits - before - after);
-    decimals[i] = {p + ends[i], before + after, after, 2 * after + negative};
+    const unsigned digits = before + after;
+    // Of more digits than a lane holds, the first one.
+    const unsigned lead =
+        digits > kMostDigits ? static_cast<unsigned>(p[begin + negative] - '0') : 0;
+    excess |= (before - 1) | (after - 1) | (kMostDigits + 1 - digits) | (lead > 9 ? 8 : 0);
+    decimals[i] = {p + ends[i], std::min(digits, kMostDigits), after, 2 * after + negative, lead};
     begin = ends[i] + 1;
   }
   if (excess >= kMostDigits || !decimal_values(decimals, values)) return 0;
