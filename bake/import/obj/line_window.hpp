@@ -156,19 +156,28 @@ inline __m128d decimal_pair(__m128i numbers, const Decimal& low, const Decimal& 
   return _mm_div_pd(values, _mm_castsi128_pd(divisors));
 }
 
-/// Computes two or three decimals; false where one of them is no number.
+/// Computes two, three or six decimals, two in a register; false where one of them is no number.
 template <std::size_t kCount>
 [[gnu::always_inline]] inline bool decimal_values(const std::array<Decimal, kCount>& decimals,
                                                   double* values) {
-  static_assert(kCount == 2 || kCount == 3);
-  const Decimal& last = decimals[kCount - 1];
+  constexpr std::size_t kPairs = (kCount + 1) / 2;
+  const auto second_of = [&](std::size_t pair) -> const Decimal& {
+    return decimals[std::min(2 * pair + 1, kCount - 1)];
+  };
   __m128i bad = _mm_setzero_si128();
-  const __m128i first = join_fours(decimal_lanes(decimals[0], decimals[1], bad));
-  const __m128i second = kCount == 3 ? join_fours(decimal_lanes(last, last, bad)) : first;
-  const __m128i numbers = join_eights(first, second);
-  _mm_storeu_pd(values, decimal_pair(numbers, decimals[0], decimals[1]));
-  if (kCount == 3) {
-    _mm_store_sd(values + 2, decimal_pair(_mm_unpackhi_epi64(numbers, numbers), last, last));
+  __m128i fours[kPairs];
+  for (std::size_t i = 0; i < kPairs; ++i) {
+    fours[i] = join_fours(decimal_lanes(decimals[2 * i], second_of(i), bad));
+  }
+  for (std::size_t i = 0; i < kPairs; ++i) {
+    __m128i numbers = join_eights(fours[i - i % 2], fours[std::min(i - i % 2 + 1, kPairs - 1)]);
+    if (i % 2 != 0) numbers = _mm_unpackhi_epi64(numbers, numbers);
+    const __m128d pair = decimal_pair(numbers, decimals[2 * i], second_of(i));
+    if (2 * i + 1 < kCount) {
+      _mm_storeu_pd(values + 2 * i, pair);
+    } else {
+      _mm_store_sd(values + 2 * i, pair);
+    }
   }
   return _mm_movemask_epi8(_mm_cmpeq_epi8(bad, _mm_setzero_si128())) == 0xFFFF;
 }
@@ -179,16 +188,17 @@ struct DecimalMarks {
   std::uint64_t points;
 };
 
-/// kCount decimals at p + begin, each after one blank but the first. Returns the place of the first
+/// kCount decimals at p, each after one blank but the first. Returns the place of the first
 /// byte after them, 0 for anything else. Reads from kTextPadding bytes ahead of p.
 template <std::size_t kCount>
-[[gnu::always_inline]] inline unsigned take_decimals(const char* p, unsigned begin,
-                                                     DecimalMarks& marks, double* values) {
+[[gnu::always_inline]] inline unsigned take_decimals(const char* p, DecimalMarks& marks,
+                                                     double* values) {
   std::array<unsigned, kCount> ends;
   std::array<unsigned, kCount> points;
   if (!take_bits(marks.ends, ends) || !take_bits(marks.points, points)) return 0;
   std::array<Decimal, kCount> decimals;
   unsigned excess = 0;
+  unsigned begin = 0;
   for (std::size_t i = 0; i < kCount; ++i) {
     if (i > 0 && p[ends[i - 1]] != ' ') return 0;
     const unsigned negative = p[begin] == '-' ? 1 : 0;
@@ -211,20 +221,26 @@ template <std::size_t kCount>
 inline const char* take_three_or_six(const char* p, double* values, unsigned& count) {
   // Three end within 48 bytes.
   DecimalMarks marks = {bytes_outside<'-', 0, 48>(p), points_in<0, 48>(p)};
-  unsigned end = take_decimals<3>(p, 0, marks, values);
+  const std::uint64_t from_second = marks.ends & (marks.ends - 1);
+  const std::uint64_t from_third = from_second & (from_second - 1);
+  if (from_third == 0) return nullptr;
+  unsigned end = 0;
   count = 3;
-  if (end == 0 || p[end] != ' ') return end == 0 ? nullptr : p + end;
-  marks.ends |= bytes_outside<'-', 48, 64>(p);
-  marks.points |= points_in<48, 64>(p);
-  end = take_decimals<3>(p, end + 1, marks, values + 3);
-  count = 6;
+  if (p[__builtin_ctzll(from_third)] != ' ') {
+    end = take_decimals<3>(p, marks, values);
+  } else {
+    count = 6;
+    marks.ends |= bytes_outside<'-', 48, 64>(p);
+    marks.points |= points_in<48, 64>(p);
+    end = take_decimals<6>(p, marks, values);
+  }
   return end == 0 ? nullptr : p + end;
 }
 
 /// Two decimals at p, with one blank between them.
 inline const char* take_two(const char* p, double* values) {
   DecimalMarks marks = {bytes_outside<'-', 0, 32>(p), points_in<0, 32>(p)};
-  const unsigned end = take_decimals<2>(p, 0, marks, values);
+  const unsigned end = take_decimals<2>(p, marks, values);
   return end == 0 ? nullptr : p + end;
 }
 
