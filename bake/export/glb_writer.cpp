@@ -110,8 +110,7 @@ void GlbBuilder::add_materials(const ModelRecord& model) {
     pbr.roughnessFactor = roughness_of(source.shininess);
     material.emissiveFactor.assign(3, 0.0);
     for (std::size_t i = 0; i < 3; ++i) {
-      pbr.baseColorFactor[i] =
-          std::clamp(linear_of_srgb(static_cast<double>(source.diffuse[i])), 0.0, 1.0);
+      pbr.baseColorFactor[i] = exported_diffuse(bundle_, source, i);
       material.emissiveFactor[i] =
           std::clamp(linear_of_srgb(static_cast<double>(source.emission[i])), 0.0, 1.0);
     }
@@ -232,6 +231,23 @@ Result<std::vector<std::byte>> guarded_build(const BundleView& bundle, Build&& b
 double roughness_of(float shininess) {
   const double exponent = std::max(0.0, static_cast<double>(shininess));
   return std::pow(2.0 / (exponent + 2.0), 0.25);
+}
+
+float export_gain(const BundleView& bundle, std::uint32_t texture) {
+  float gain = 1;
+  for (std::uint32_t m = 0; m < bundle.materials().size(); ++m) {
+    const MaterialRecord& material = bundle.materials()[m];
+    const auto& [red, green, blue] = material.diffuse;
+    if (material.texture == texture) gain = std::max({gain, red, green, blue});
+  }
+  return gain;
+}
+
+double exported_diffuse(const BundleView& bundle, const MaterialRecord& material,
+                        std::size_t channel) {
+  const float gain = material.texture == kNone ? 1.0F : export_gain(bundle, material.texture);
+  const auto stored = static_cast<double>(material.diffuse[channel] / gain);
+  return std::clamp(linear_of_srgb(stored), 0.0, 1.0);
 }
 
 bool shows_texture(const BundleView& bundle, const ModelRecord& model, std::uint32_t texture) {

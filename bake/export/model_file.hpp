@@ -49,6 +49,14 @@ double roughness_of(float shininess);
 /// Whether any material of the model shows the texture.
 bool shows_texture(const BundleView& bundle, const ModelRecord& model, std::uint32_t texture);
 
+/// What an exported texture is multiplied with, and a material's diffuse divided by: files hold no
+/// factor above 1, as materials have it whose relief gets brighter than white.
+float export_gain(const BundleView& bundle, std::uint32_t texture);
+
+/// A channel of a material's diffuse in linear light, as files hold it.
+double exported_diffuse(const BundleView& bundle, const MaterialRecord& material,
+                        std::size_t channel);
+
 /// Level 0 of a model: one primitive a chunk, positions in source units (about the model's
 /// centre, which is the node's translation, so that large coordinates keep their digits in floats),
 /// normals, uv and colours as they decode, materials, textures as PNG.

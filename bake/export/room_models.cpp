@@ -1,6 +1,9 @@
 // From a pattern's plane to a room's ground.
 #include "bake/export/room_models.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "bake/texture/texture_codec.hpp"
 #include "modar/renderer.hpp"
 
@@ -43,6 +46,11 @@ std::vector<GlbImage> decoded_textures(const BundleView& bundle) {
       for (std::size_t i = 0; i < alpha.pixels.size(); i += 4) {
         image.pixels.pixels[i + 3] = alpha.pixels[i];
       }
+    }
+    const float gain = export_gain(bundle, t);
+    for (std::size_t i = 0; gain > 1 && i < image.pixels.pixels.size(); ++i) {
+      std::uint8_t& value = image.pixels.pixels[i];
+      if (i % 4 != 3) value = static_cast<std::uint8_t>(std::min(255L, std::lround(gain * value)));
     }
     images.push_back(std::move(image));
   }

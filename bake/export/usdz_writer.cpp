@@ -179,7 +179,7 @@ Result<void> Description::add_material(std::uint32_t index, bool coloured) {
   glm::dvec3 diffuse;
   glm::dvec3 emission;
   for (int i = 0; i < 3; ++i) {
-    diffuse[i] = std::clamp(linear_of_srgb(static_cast<double>(source.diffuse[i])), 0.0, 1.0);
+    diffuse[i] = exported_diffuse(bundle_, source, static_cast<std::size_t>(i));
     emission[i] = std::clamp(linear_of_srgb(static_cast<double>(source.emission[i])), 0.0, 1.0);
   }
   std::string file;

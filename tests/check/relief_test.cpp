@@ -1,5 +1,6 @@
 // Relief that is drawn into base colours, against the renderer's own shading of surfaces that lie
 // as a normal map says.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -13,6 +14,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "bake/bundle/bundle_builder.hpp"
+#include "bake/export/room_models.hpp"
 #include "bake/image/image.hpp"
 #include "bake/texture/relief/relief.hpp"
 #include "formats/base/atomic_file.hpp"
@@ -166,6 +168,41 @@ TEST_F(Relief, BrightensWhatHasNoPictureToo) {
   const int wanted = seen("lies");
   EXPECT_GT(wanted, seen("flat") + 4);
   EXPECT_NEAR(seen("drawn"), wanted, 2);
+}
+
+TEST_F(Relief, IsExportedAsBrightThoughFilesHoldNoFactorAboveOne) {
+  // One half towards the lamp, one away from it, on a white surface.
+  RgbaImage map = plain(64, 64, stored(glm::normalize(glm::dvec3(-0.4, -0.3, 1))));
+  const auto away = stored(glm::normalize(glm::dvec3(0.4, 0.3, 1)));
+  for (std::size_t i = 0; i < map.pixels.size() / 2; ++i) {
+    if (i % 4 != 3) map.pixels[i] = static_cast<std::uint8_t>(away[i % 4]);
+  }
+  ASSERT_TRUE(write_png(map, path("normal.png")));
+  write_square("white", kUpright, {0, 0, 1}, "norm normal.png\n");
+  BakeRequest request;
+  request.models = {path("white.obj")};
+  request.up = UpAxis::kZ;
+  const auto content = build_bundle(request, report_);
+  ASSERT_TRUE(content) << to_line(content.error());
+  const MaterialRecord& material = content->materials[0];
+  EXPECT_GT(material.diffuse[0], 1.0F);
+  const auto bytes = encode_bundle(*content);
+  const auto bundle = BundleView::open(*bytes);
+  ASSERT_TRUE(bundle);
+  EXPECT_EQ(exported_diffuse(*bundle, material, 0), 1.0);
+  const RgbaImage pixels = decoded_textures(*bundle).at(0).pixels;
+  std::uint8_t least = 255;
+  std::uint8_t most = 0;
+  for (std::size_t i = 0; i < pixels.pixels.size(); i += 4) {
+    least = std::min(least, pixels.pixels[i]);
+    most = std::max(most, pixels.pixels[i]);
+  }
+  EXPECT_GE(most, 253);
+  // As the device shows them beside each other.
+  TriMesh mesh = square("grey.png", "normal.png");
+  ASSERT_TRUE(draw_relief(mesh, {}, report_));
+  const std::vector<std::uint8_t> grey = picture_of(mesh).pixels;
+  EXPECT_NEAR(least, 255.0 * *std::min_element(grey.begin(), grey.end()) / kGrey, 4);
 }
 
 TEST_F(Relief, ShadesWhatLiesBetweenVertices) {

@@ -495,7 +495,7 @@ class ReliefPainter {
     return triangles;
   }
 
-  /// Brighter than white is what is multiplied beside the picture.
+  /// Where some gets brighter than white, all is divided by headroom.
   static bool apply(const std::vector<float>& factors, RgbaImage& image, float& headroom) {
     float most = 255.0F;
     const auto drawn = [&](std::size_t p) { return float(image.pixels[p]) * factors[p / 4]; };
