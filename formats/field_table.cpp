@@ -39,208 +39,96 @@ constexpr FieldInfo info(const char* name, std::size_t offset) {
           starts_with(name, "reserved")};
 }
 
-// A member's name and place can be had together through the preprocessor only.
-#define MODAR_FIELD(type, member) info<decltype(type::member)>(#member, offsetof(type, member))
+// A member's name and place can be had together through the preprocessor only: MODAR_FIELDS(record,
+// members...) is the array of what the members are. A macro that is scanned again calls itself once
+// more, for the next member: 27 times, as its nesting is.
+#define MODAR_SCAN(...) MODAR_SCAN_9(MODAR_SCAN_9(MODAR_SCAN_9(__VA_ARGS__)))
+#define MODAR_SCAN_9(...) MODAR_SCAN_3(MODAR_SCAN_3(MODAR_SCAN_3(__VA_ARGS__)))
+#define MODAR_SCAN_3(...) MODAR_SCAN_1(MODAR_SCAN_1(MODAR_SCAN_1(__VA_ARGS__)))
+#define MODAR_SCAN_1(...) __VA_ARGS__
+#define MODAR_NO_ARGUMENT ()
+#define MODAR_EACH(record, member, ...)                             \
+  info<decltype(record::member)>(#member, offsetof(record, member)) \
+      __VA_OPT__(, MODAR_EACH_AGAIN MODAR_NO_ARGUMENT(record, __VA_ARGS__))
+#define MODAR_EACH_AGAIN() MODAR_EACH
+#define MODAR_FIELDS(record, ...) \
+  constexpr FieldInfo k##record[] = {MODAR_SCAN(MODAR_EACH(record, __VA_ARGS__))}
 
-constexpr FieldInfo kModelRecord[] = {MODAR_FIELD(ModelRecord, name),
-                                      MODAR_FIELD(ModelRecord, center),
-                                      MODAR_FIELD(ModelRecord, scale),
-                                      MODAR_FIELD(ModelRecord, diagonal),
-                                      MODAR_FIELD(ModelRecord, unit_metres),
-                                      MODAR_FIELD(ModelRecord, position_error_max),
-                                      MODAR_FIELD(ModelRecord, position_error_rms),
-                                      MODAR_FIELD(ModelRecord, normal_error_max_deg),
-                                      MODAR_FIELD(ModelRecord, normal_error_rms_deg),
-                                      MODAR_FIELD(ModelRecord, uv_error_max_texels),
-                                      MODAR_FIELD(ModelRecord, uv_error_rms_texels),
-                                      MODAR_FIELD(ModelRecord, vertex_count),
-                                      MODAR_FIELD(ModelRecord, triangle_count),
-                                      MODAR_FIELD(ModelRecord, source_vertex_count),
-                                      MODAR_FIELD(ModelRecord, source_face_count),
-                                      MODAR_FIELD(ModelRecord, layout),
-                                      MODAR_FIELD(ModelRecord, first_chunk),
-                                      MODAR_FIELD(ModelRecord, chunk_count),
-                                      MODAR_FIELD(ModelRecord, first_material),
-                                      MODAR_FIELD(ModelRecord, material_count),
-                                      MODAR_FIELD(ModelRecord, level_count),
-                                      MODAR_FIELD(ModelRecord, reserved)};
-constexpr FieldInfo kChunkRecord[] = {
-    MODAR_FIELD(ChunkRecord, bounds_min),      MODAR_FIELD(ChunkRecord, bounds_max),
-    MODAR_FIELD(ChunkRecord, cone_axis),       MODAR_FIELD(ChunkRecord, cone_cutoff),
-    MODAR_FIELD(ChunkRecord, position_offset), MODAR_FIELD(ChunkRecord, position_step),
-    MODAR_FIELD(ChunkRecord, uv_offset),       MODAR_FIELD(ChunkRecord, uv_scale),
-    MODAR_FIELD(ChunkRecord, material),        MODAR_FIELD(ChunkRecord, first_level),
-    MODAR_FIELD(ChunkRecord, level_count),     MODAR_FIELD(ChunkRecord, reserved)};
-constexpr FieldInfo kLevelRecord[] = {
-    MODAR_FIELD(LevelRecord, vertex_offset), MODAR_FIELD(LevelRecord, index_offset),
-    MODAR_FIELD(LevelRecord, vertex_count),  MODAR_FIELD(LevelRecord, index_count),
-    MODAR_FIELD(LevelRecord, error),         MODAR_FIELD(LevelRecord, reserved)};
-constexpr FieldInfo kMaterialRecord[] = {
-    MODAR_FIELD(MaterialRecord, name),     MODAR_FIELD(MaterialRecord, ambient),
-    MODAR_FIELD(MaterialRecord, diffuse),  MODAR_FIELD(MaterialRecord, specular),
-    MODAR_FIELD(MaterialRecord, emission), MODAR_FIELD(MaterialRecord, shininess),
-    MODAR_FIELD(MaterialRecord, opacity),  MODAR_FIELD(MaterialRecord, texture),
-    MODAR_FIELD(MaterialRecord, flags),    MODAR_FIELD(MaterialRecord, reserved)};
-constexpr FieldInfo kLayoutRecord[] = {
-    MODAR_FIELD(LayoutRecord, stride), MODAR_FIELD(LayoutRecord, attribute_count),
-    MODAR_FIELD(LayoutRecord, reserved), MODAR_FIELD(LayoutRecord, attributes)};
-constexpr FieldInfo kTextureRecord[] = {
-    MODAR_FIELD(TextureRecord, name),          MODAR_FIELD(TextureRecord, width),
-    MODAR_FIELD(TextureRecord, height),        MODAR_FIELD(TextureRecord, source_width),
-    MODAR_FIELD(TextureRecord, source_height), MODAR_FIELD(TextureRecord, format),
-    MODAR_FIELD(TextureRecord, flags),         MODAR_FIELD(TextureRecord, first_level),
-    MODAR_FIELD(TextureRecord, level_count),   MODAR_FIELD(TextureRecord, psnr_db),
-    MODAR_FIELD(TextureRecord, ssim),          MODAR_FIELD(TextureRecord, reserved)};
-constexpr FieldInfo kTextureLevelRecord[] = {
-    MODAR_FIELD(TextureLevelRecord, offset), MODAR_FIELD(TextureLevelRecord, alpha_offset),
-    MODAR_FIELD(TextureLevelRecord, size),   MODAR_FIELD(TextureLevelRecord, width),
-    MODAR_FIELD(TextureLevelRecord, height), MODAR_FIELD(TextureLevelRecord, psnr_db),
-    MODAR_FIELD(TextureLevelRecord, ssim),   MODAR_FIELD(TextureLevelRecord, reserved)};
-constexpr FieldInfo kPatternRecord[] = {
-    MODAR_FIELD(PatternRecord, name),       MODAR_FIELD(PatternRecord, width),
-    MODAR_FIELD(PatternRecord, height),     MODAR_FIELD(PatternRecord, width_mm),
-    MODAR_FIELD(PatternRecord, half_width), MODAR_FIELD(PatternRecord, half_height),
-    MODAR_FIELD(PatternRecord, score),      MODAR_FIELD(PatternRecord, score_version),
-    MODAR_FIELD(PatternRecord, reserved)};
-constexpr FieldInfo kParameterSetRecord[] = {MODAR_FIELD(ParameterSetRecord, name),
-                                             MODAR_FIELD(ParameterSetRecord, id),
-                                             MODAR_FIELD(ParameterSetRecord, detector),
-                                             MODAR_FIELD(ParameterSetRecord, max_features),
-                                             MODAR_FIELD(ParameterSetRecord, scale_factor),
-                                             MODAR_FIELD(ParameterSetRecord, level_count),
-                                             MODAR_FIELD(ParameterSetRecord, edge_threshold),
-                                             MODAR_FIELD(ParameterSetRecord, first_level),
-                                             MODAR_FIELD(ParameterSetRecord, wta_k),
-                                             MODAR_FIELD(ParameterSetRecord, harris),
-                                             MODAR_FIELD(ParameterSetRecord, patch_size),
-                                             MODAR_FIELD(ParameterSetRecord, fast_threshold),
-                                             MODAR_FIELD(ParameterSetRecord, agast_threshold),
-                                             MODAR_FIELD(ParameterSetRecord, octaves),
-                                             MODAR_FIELD(ParameterSetRecord, pattern_scale),
-                                             MODAR_FIELD(ParameterSetRecord, descriptor_bits),
-                                             MODAR_FIELD(ParameterSetRecord, max_distance),
-                                             MODAR_FIELD(ParameterSetRecord, min_matches),
-                                             MODAR_FIELD(ParameterSetRecord, min_inliers),
-                                             MODAR_FIELD(ParameterSetRecord, ransac_threshold),
-                                             MODAR_FIELD(ParameterSetRecord, reserved)};
-constexpr FieldInfo kSceneRecord[] = {
-    MODAR_FIELD(SceneRecord, pattern),  MODAR_FIELD(SceneRecord, model),
-    MODAR_FIELD(SceneRecord, scale),    MODAR_FIELD(SceneRecord, offset),
-    MODAR_FIELD(SceneRecord, rotation), MODAR_FIELD(SceneRecord, reserved)};
-constexpr FieldInfo kLightRecord[] = {
-    MODAR_FIELD(LightRecord, scene), MODAR_FIELD(LightRecord, reserved0),
-    MODAR_FIELD(LightRecord, sky),   MODAR_FIELD(LightRecord, direction),
-    MODAR_FIELD(LightRecord, key),   MODAR_FIELD(LightRecord, reserved1)};
-constexpr FieldInfo kOcclusionRecord[] = {MODAR_FIELD(OcclusionRecord, layout),
-                                          MODAR_FIELD(OcclusionRecord, offset)};
-constexpr FieldInfo kNodeRecord[] = {
-    MODAR_FIELD(NodeRecord, name),      MODAR_FIELD(NodeRecord, pattern),
-    MODAR_FIELD(NodeRecord, kind),      MODAR_FIELD(NodeRecord, subject),
-    MODAR_FIELD(NodeRecord, flags),     MODAR_FIELD(NodeRecord, group),
-    MODAR_FIELD(NodeRecord, place),     MODAR_FIELD(NodeRecord, rotation),
-    MODAR_FIELD(NodeRecord, half_size), MODAR_FIELD(NodeRecord, mark),
-    MODAR_FIELD(NodeRecord, alpha),     MODAR_FIELD(NodeRecord, key),
-    MODAR_FIELD(NodeRecord, reach),     MODAR_FIELD(NodeRecord, reserved)};
-constexpr FieldInfo kMediaRecord[] = {
-    MODAR_FIELD(MediaRecord, name),   MODAR_FIELD(MediaRecord, kind),
-    MODAR_FIELD(MediaRecord, flags),  MODAR_FIELD(MediaRecord, width),
-    MODAR_FIELD(MediaRecord, height), MODAR_FIELD(MediaRecord, seconds),
-    MODAR_FIELD(MediaRecord, poster), MODAR_FIELD(MediaRecord, reserved)};
-constexpr FieldInfo kActionRecord[] = {
-    MODAR_FIELD(ActionRecord, event),   MODAR_FIELD(ActionRecord, command),
-    MODAR_FIELD(ActionRecord, source),  MODAR_FIELD(ActionRecord, target),
-    MODAR_FIELD(ActionRecord, part),    MODAR_FIELD(ActionRecord, address),
-    MODAR_FIELD(ActionRecord, seconds), MODAR_FIELD(ActionRecord, duration),
-    MODAR_FIELD(ActionRecord, axis),    MODAR_FIELD(ActionRecord, degrees),
-    MODAR_FIELD(ActionRecord, reserved)};
-constexpr FieldInfo kStandInRecord[] = {
-    MODAR_FIELD(StandInRecord, model), MODAR_FIELD(StandInRecord, first_chunk),
-    MODAR_FIELD(StandInRecord, chunk_count), MODAR_FIELD(StandInRecord, reserved)};
-constexpr FieldInfo kColourGridHeader[] = {MODAR_FIELD(ColourGridHeader, columns),
-                                           MODAR_FIELD(ColourGridHeader, rows),
-                                           MODAR_FIELD(ColourGridHeader, reserved)};
-constexpr FieldInfo kPatternShapeHeader[] = {
-    MODAR_FIELD(PatternShapeHeader, kind), MODAR_FIELD(PatternShapeHeader, face_count),
-    MODAR_FIELD(PatternShapeHeader, half_arc), MODAR_FIELD(PatternShapeHeader, slope),
-    MODAR_FIELD(PatternShapeHeader, reserved)};
-constexpr FieldInfo kShapeFaceRecord[] = {
-    MODAR_FIELD(ShapeFaceRecord, place), MODAR_FIELD(ShapeFaceRecord, corner),
-    MODAR_FIELD(ShapeFaceRecord, right), MODAR_FIELD(ShapeFaceRecord, down),
-    MODAR_FIELD(ShapeFaceRecord, reserved)};
-constexpr FieldInfo kDrawOrderRecord[] = {MODAR_FIELD(DrawOrderRecord, plane),
-                                          MODAR_FIELD(DrawOrderRecord, behind),
-                                          MODAR_FIELD(DrawOrderRecord, triangle)};
-constexpr FieldInfo kShadowHeader[] = {
-    MODAR_FIELD(ShadowHeader, width), MODAR_FIELD(ShadowHeader, height),
-    MODAR_FIELD(ShadowHeader, low), MODAR_FIELD(ShadowHeader, high),
-    MODAR_FIELD(ShadowHeader, reserved)};
-constexpr FieldInfo kFileHeader[] = {
-    MODAR_FIELD(FileHeader, magic),      MODAR_FIELD(FileHeader, major),
-    MODAR_FIELD(FileHeader, minor),      MODAR_FIELD(FileHeader, section_count),
-    MODAR_FIELD(FileHeader, file_size),  MODAR_FIELD(FileHeader, table_offset),
-    MODAR_FIELD(FileHeader, entry_size), MODAR_FIELD(FileHeader, reserved0),
-    MODAR_FIELD(FileHeader, reserved1),  MODAR_FIELD(FileHeader, hash)};
-constexpr FieldInfo kSectionEntry[] = {
-    MODAR_FIELD(SectionEntry, type),    MODAR_FIELD(SectionEntry, version),
-    MODAR_FIELD(SectionEntry, flags),   MODAR_FIELD(SectionEntry, owner),
-    MODAR_FIELD(SectionEntry, variant), MODAR_FIELD(SectionEntry, offset),
-    MODAR_FIELD(SectionEntry, size),    MODAR_FIELD(SectionEntry, hash),
-    MODAR_FIELD(SectionEntry, reserved)};
-constexpr FieldInfo kTableHeader[] = {MODAR_FIELD(TableHeader, count),
-                                      MODAR_FIELD(TableHeader, stride),
-                                      MODAR_FIELD(TableHeader, reserved)};
-constexpr FieldInfo kAttributeRecord[] = {
-    MODAR_FIELD(AttributeRecord, semantic),   MODAR_FIELD(AttributeRecord, type),
-    MODAR_FIELD(AttributeRecord, components), MODAR_FIELD(AttributeRecord, normalised),
-    MODAR_FIELD(AttributeRecord, offset),     MODAR_FIELD(AttributeRecord, reserved)};
-constexpr FieldInfo kFeatureHeader[] = {
-    MODAR_FIELD(FeatureHeader, count), MODAR_FIELD(FeatureHeader, descriptor_bytes),
-    MODAR_FIELD(FeatureHeader, keypoints_offset), MODAR_FIELD(FeatureHeader, descriptors_offset),
-    MODAR_FIELD(FeatureHeader, reserved)};
-constexpr FieldInfo kKeypointRecord[] = {
-    MODAR_FIELD(KeypointRecord, x),        MODAR_FIELD(KeypointRecord, y),
-    MODAR_FIELD(KeypointRecord, size),     MODAR_FIELD(KeypointRecord, angle),
-    MODAR_FIELD(KeypointRecord, response), MODAR_FIELD(KeypointRecord, octave),
-    MODAR_FIELD(KeypointRecord, class_id)};
-#undef MODAR_FIELD
+MODAR_FIELDS(ModelRecord, name, center, scale, diagonal, unit_metres, position_error_max,
+             position_error_rms, normal_error_max_deg, normal_error_rms_deg, uv_error_max_texels,
+             uv_error_rms_texels, vertex_count, triangle_count, source_vertex_count,
+             source_face_count, layout, first_chunk, chunk_count, first_material, material_count,
+             level_count, reserved);
+MODAR_FIELDS(ChunkRecord, bounds_min, bounds_max, cone_axis, cone_cutoff, position_offset,
+             position_step, uv_offset, uv_scale, material, first_level, level_count, reserved);
+MODAR_FIELDS(LevelRecord, vertex_offset, index_offset, vertex_count, index_count, error, reserved);
+MODAR_FIELDS(MaterialRecord, name, ambient, diffuse, specular, emission, shininess, opacity,
+             texture, flags, reserved);
+MODAR_FIELDS(LayoutRecord, stride, attribute_count, reserved, attributes);
+MODAR_FIELDS(TextureRecord, name, width, height, source_width, source_height, format, flags,
+             first_level, level_count, psnr_db, ssim, reserved);
+MODAR_FIELDS(TextureLevelRecord, offset, alpha_offset, size, width, height, psnr_db, ssim,
+             reserved);
+MODAR_FIELDS(PatternRecord, name, width, height, width_mm, half_width, half_height, score,
+             score_version, reserved);
+MODAR_FIELDS(ParameterSetRecord, name, id, detector, max_features, scale_factor, level_count,
+             edge_threshold, first_level, wta_k, harris, patch_size, fast_threshold,
+             agast_threshold, octaves, pattern_scale, descriptor_bits, max_distance, min_matches,
+             min_inliers, ransac_threshold, reserved);
+MODAR_FIELDS(SceneRecord, pattern, model, scale, offset, rotation, reserved);
+MODAR_FIELDS(LightRecord, scene, reserved0, sky, direction, key, reserved1);
+MODAR_FIELDS(OcclusionRecord, layout, offset);
+MODAR_FIELDS(NodeRecord, name, pattern, kind, subject, flags, group, place, rotation, half_size,
+             mark, alpha, key, reach, reserved);
+MODAR_FIELDS(MediaRecord, name, kind, flags, width, height, seconds, poster, reserved);
+MODAR_FIELDS(ActionRecord, event, command, source, target, part, address, seconds, duration, axis,
+             degrees, reserved);
+MODAR_FIELDS(StandInRecord, model, first_chunk, chunk_count, reserved);
+MODAR_FIELDS(ColourGridHeader, columns, rows, reserved);
+MODAR_FIELDS(PatternShapeHeader, kind, face_count, half_arc, slope, reserved);
+MODAR_FIELDS(ShapeFaceRecord, place, corner, right, down, reserved);
+MODAR_FIELDS(DrawOrderRecord, plane, behind, triangle);
+MODAR_FIELDS(ShadowHeader, width, height, low, high, reserved);
+MODAR_FIELDS(FileHeader, magic, major, minor, section_count, file_size, table_offset, entry_size,
+             reserved0, reserved1, hash);
+MODAR_FIELDS(SectionEntry, type, version, flags, owner, variant, offset, size, hash, reserved);
+MODAR_FIELDS(TableHeader, count, stride, reserved);
+MODAR_FIELDS(AttributeRecord, semantic, type, components, normalised, offset, reserved);
+MODAR_FIELDS(FeatureHeader, count, descriptor_bytes, keypoints_offset, descriptors_offset,
+             reserved);
+MODAR_FIELDS(KeypointRecord, x, y, size, angle, response, octave, class_id);
+#undef MODAR_FIELDS
 
-// The table and its name are those of the registry.
-#define MODAR_TABLE(record)                                                                    \
-  {                                                                                            \
-#record, section_of_record(#record).name, section_of_record(#record).type, sizeof(record), \
-        k##record                                                                              \
-  }
+constexpr RecordInfo record_of(const char* name, std::size_t size,
+                               std::span<const FieldInfo> fields) {
+  return {name, nullptr, SectionType::kNames, size, fields};
+}
+
+/// The table and its name are those of the registry.
+constexpr RecordInfo table_of(const char* name, std::size_t size,
+                              std::span<const FieldInfo> fields) {
+  const SectionInfo& section = section_of_record(name);
+  return {name, section.name, section.type, size, fields};
+}
+
+#define MODAR_TYPE(record) #record, sizeof(record), k##record
 constexpr RecordInfo kRecords[] = {
-    MODAR_TABLE(ModelRecord),
-    MODAR_TABLE(ChunkRecord),
-    MODAR_TABLE(LevelRecord),
-    MODAR_TABLE(MaterialRecord),
-    MODAR_TABLE(LayoutRecord),
-    MODAR_TABLE(TextureRecord),
-    MODAR_TABLE(TextureLevelRecord),
-    MODAR_TABLE(PatternRecord),
-    MODAR_TABLE(ParameterSetRecord),
-    MODAR_TABLE(SceneRecord),
-    MODAR_TABLE(LightRecord),
-    MODAR_TABLE(OcclusionRecord),
-    MODAR_TABLE(NodeRecord),
-    MODAR_TABLE(ActionRecord),
-    MODAR_TABLE(MediaRecord),
-    MODAR_TABLE(StandInRecord),
-    {"FileHeader", nullptr, SectionType::kNames, sizeof(FileHeader), kFileHeader},
-    {"SectionEntry", nullptr, SectionType::kNames, sizeof(SectionEntry), kSectionEntry},
-    {"TableHeader", nullptr, SectionType::kNames, sizeof(TableHeader), kTableHeader},
-    {"AttributeRecord", nullptr, SectionType::kNames, sizeof(AttributeRecord), kAttributeRecord},
-    {"FeatureHeader", nullptr, SectionType::kNames, sizeof(FeatureHeader), kFeatureHeader},
-    {"KeypointRecord", nullptr, SectionType::kNames, sizeof(KeypointRecord), kKeypointRecord},
-    {"ColourGridHeader", nullptr, SectionType::kNames, sizeof(ColourGridHeader), kColourGridHeader},
-    {"PatternShapeHeader", nullptr, SectionType::kNames, sizeof(PatternShapeHeader),
-     kPatternShapeHeader},
-    {"ShapeFaceRecord", nullptr, SectionType::kNames, sizeof(ShapeFaceRecord), kShapeFaceRecord},
-    {"DrawOrderRecord", nullptr, SectionType::kNames, sizeof(DrawOrderRecord), kDrawOrderRecord},
-    {"ShadowHeader", nullptr, SectionType::kNames, sizeof(ShadowHeader), kShadowHeader},
+    table_of(MODAR_TYPE(ModelRecord)),        table_of(MODAR_TYPE(ChunkRecord)),
+    table_of(MODAR_TYPE(LevelRecord)),        table_of(MODAR_TYPE(MaterialRecord)),
+    table_of(MODAR_TYPE(LayoutRecord)),       table_of(MODAR_TYPE(TextureRecord)),
+    table_of(MODAR_TYPE(TextureLevelRecord)), table_of(MODAR_TYPE(PatternRecord)),
+    table_of(MODAR_TYPE(ParameterSetRecord)), table_of(MODAR_TYPE(SceneRecord)),
+    table_of(MODAR_TYPE(LightRecord)),        table_of(MODAR_TYPE(OcclusionRecord)),
+    table_of(MODAR_TYPE(NodeRecord)),         table_of(MODAR_TYPE(ActionRecord)),
+    table_of(MODAR_TYPE(MediaRecord)),        table_of(MODAR_TYPE(StandInRecord)),
+    record_of(MODAR_TYPE(FileHeader)),        record_of(MODAR_TYPE(SectionEntry)),
+    record_of(MODAR_TYPE(TableHeader)),       record_of(MODAR_TYPE(AttributeRecord)),
+    record_of(MODAR_TYPE(FeatureHeader)),     record_of(MODAR_TYPE(KeypointRecord)),
+    record_of(MODAR_TYPE(ColourGridHeader)),  record_of(MODAR_TYPE(PatternShapeHeader)),
+    record_of(MODAR_TYPE(ShapeFaceRecord)),   record_of(MODAR_TYPE(DrawOrderRecord)),
+    record_of(MODAR_TYPE(ShadowHeader)),
 };
-#undef MODAR_TABLE
+#undef MODAR_TYPE
 
 }  // namespace
 
