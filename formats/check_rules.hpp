@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <memory>
 #include <string>
-#include <string_view>
 
 #include "formats/bundle_view.hpp"
 #include "formats/rules.hpp"

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <string>
-#include <utility>
 
 #include "formats/base/error.hpp"
 #include "formats/check.hpp"

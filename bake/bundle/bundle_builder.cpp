@@ -4,9 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
-#include <set>
-#include <string_view>
 
 #include <glm/geometric.hpp>
 

@@ -5,7 +5,6 @@
 #include <functional>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "formats/bundle_view.hpp"

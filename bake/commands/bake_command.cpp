@@ -1,10 +1,8 @@
 // `modar bake`: models and pattern images to one bundle.
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <thread>

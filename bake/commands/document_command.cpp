@@ -1,6 +1,5 @@
 // `modar document`: manual pages and completions of shells, from the words of --help.
 #include <algorithm>
-#include <cstdio>
 #include <memory>
 #include <string>
 

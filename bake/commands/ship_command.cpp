@@ -11,7 +11,6 @@
 #include <ctime>
 #include <fstream>
 #include <iterator>
-#include <optional>
 
 #include "bake/commands/ship_json.hpp"
 #include "bake/io/output.hpp"

@@ -1,7 +1,6 @@
 // `modar ship`: keys, releases, what an update costs. ship_cli.cpp fills the options.
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <vector>
 

@@ -1,7 +1,6 @@
 #include "bake/mesh/upright.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 

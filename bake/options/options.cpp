@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "bake/options/request_text.hpp"
 #include "formats/base/path.hpp"

@@ -2,7 +2,6 @@
 #include "bake/page/report_page.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdarg>
 #include <cstdio>
 #include <filesystem>

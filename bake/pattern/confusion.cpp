@@ -2,7 +2,6 @@
 #include "bake/pattern/confusion.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 #include <span>
 

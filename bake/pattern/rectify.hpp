@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
 
 #include "bake/image/image.hpp"
 #include "bake/pattern/plane_aspect.hpp"

@@ -11,7 +11,6 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
-#include <set>
 
 #include <minizip/unzip.h>
 #include <minizip/zip.h>

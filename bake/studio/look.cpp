@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <functional>
-#include <map>
 #include <vector>
 
 #include "bake/bundle/bundle_json.hpp"

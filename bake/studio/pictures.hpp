@@ -1,9 +1,7 @@
 // Photos and the pictures in them: corners, previews, grades.
 #pragma once
 
-#include <memory>
 #include <string>
-#include <vector>
 
 #include "bake/pattern/pattern.hpp"
 #include "bake/studio/cache.hpp"

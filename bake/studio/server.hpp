@@ -1,7 +1,6 @@
 // The studio's web server: who may ask, and how much.
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <memory>
 #include <string>

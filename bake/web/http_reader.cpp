@@ -2,7 +2,6 @@
 
 #include <charconv>
 #include <memory>
-#include <string_view>
 #include <utility>
 
 #include <httplib.h>

@@ -1,7 +1,6 @@
 #include "bake/web/packed_bundle.hpp"
 
 #include <algorithm>
-#include <optional>
 #include <span>
 #include <utility>
 

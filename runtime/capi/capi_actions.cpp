@@ -1,5 +1,4 @@
 // modar.h: nodes and actions. Nothing of the tracker, and of the renderer what makes no GL call.
-#include <cmath>
 #include <memory>
 #include <vector>
 

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <memory>
-#include <new>
 #include <string>
 #include <utility>
 #include <vector>

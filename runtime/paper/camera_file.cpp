@@ -1,6 +1,5 @@
 // Reads calibration files through OpenCV, and catches what it throws.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
 #include <string_view>

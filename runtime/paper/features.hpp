@@ -1,8 +1,6 @@
 // Detector and descriptor of a parameter set, kept between frames. Internal to runtime/paper.
 #pragma once
 
-#include <vector>
-
 #include <opencv2/features2d.hpp>
 
 #include "formats/base/error.hpp"

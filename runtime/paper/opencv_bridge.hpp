@@ -1,7 +1,6 @@
 // Between our records and OpenCV's types. Internal to runtime/paper.
 #pragma once
 
-#include <string>
 #include <utility>
 
 #include <opencv2/core.hpp>

@@ -1,7 +1,6 @@
 // Maps a file for reading with mmap.
 #include "modar/mapped_file.hpp"
 
-#include <algorithm>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>

@@ -2,7 +2,6 @@
 // to runtime/render.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>

@@ -1,6 +1,5 @@
 // A ray against the triangles of a bundle: which model lies under a pixel.
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 #include <glm/geometric.hpp>

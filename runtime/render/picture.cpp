@@ -2,7 +2,6 @@
 #include "runtime/render/picture.hpp"
 
 #include <algorithm>
-#include <string>
 
 #include "runtime/render/program.hpp"
 

@@ -1,7 +1,5 @@
 #include "runtime/render/plane_painter.hpp"
 
-#include <algorithm>
-
 #include <glm/geometric.hpp>
 
 #include "runtime/render/ground.hpp"

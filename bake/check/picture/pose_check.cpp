@@ -2,7 +2,6 @@
 #include "bake/check/picture/pose_check.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <optional>
 

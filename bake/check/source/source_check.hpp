@@ -1,7 +1,6 @@
 // A bundle against the files that it was baked from.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 

@@ -1,7 +1,6 @@
 #include "bake/import/stl/facet_normals.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 

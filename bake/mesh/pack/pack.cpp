@@ -2,7 +2,6 @@
 #include "bake/mesh/pack/pack.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstring>

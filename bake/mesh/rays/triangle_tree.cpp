@@ -2,7 +2,6 @@
 #include "bake/mesh/rays/triangle_tree.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>

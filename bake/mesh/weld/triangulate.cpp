@@ -1,7 +1,6 @@
 // Ear clipping in the plane that fits the polygon best.
 #include "bake/mesh/weld/triangulate.hpp"
 
-#include <cmath>
 #include <cstddef>
 
 #include <glm/common.hpp>

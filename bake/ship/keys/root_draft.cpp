@@ -1,7 +1,6 @@
 #include "bake/ship/keys/root_draft.hpp"
 
 #include <filesystem>
-#include <optional>
 #include <utility>
 #include <vector>
 

@@ -2,7 +2,6 @@
 #include "bake/texture/atlas/atlas_layout.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numeric>
 #include <tuple>
