@@ -46,32 +46,6 @@ Bytes bytes_of(const T& record) {
   return std::as_bytes(std::span(&record, 1));
 }
 
-std::uint16_t flags_of(SectionType type) {
-  switch (type) {
-    case SectionType::kMeta:
-    case SectionType::kStatement:
-    case SectionType::kContentSummary:
-    case SectionType::kLights:
-    case SectionType::kOcclusion:
-    case SectionType::kNodes:
-    case SectionType::kActions:
-    case SectionType::kMedia:
-    case SectionType::kMediaData:
-    case SectionType::kStandIns:
-    case SectionType::kStandInChunks:
-    case SectionType::kStandInLevels:
-    case SectionType::kFeatureYml:
-    case SectionType::kShadow:
-      return 0;
-    case SectionType::kVertices:
-    case SectionType::kIndices:
-    case SectionType::kTextureData:
-      return kSectionRequired | kSectionGpu;
-    default:
-      return kSectionRequired;
-  }
-}
-
 /// The sections of a content, with the headers that the content itself does not hold.
 class SectionList {
  public:
@@ -86,7 +60,7 @@ class SectionList {
     Section section;
     section.entry.type = static_cast<std::uint32_t>(type);
     section.entry.version = 1;
-    section.entry.flags = flags_of(type);
+    section.entry.flags = section_info(section.entry.type)->flags;
     section.entry.owner = owner;
     section.entry.variant = variant;
     section.pieces = pieces;

@@ -157,15 +157,8 @@ constexpr IssueKind kIssueKinds[] = {
 static_assert(std::size(kIssueKinds) == static_cast<std::size_t>(Rule::kCount));
 
 const char* severity_word(Severity severity) {
-  switch (severity) {
-    case Severity::kError:
-      return "error";
-    case Severity::kWarning:
-      return "warning";
-    case Severity::kInfo:
-      return "info";
-  }
-  return "";
+  constexpr const char* kWords[] = {"error", "warning", "info"};
+  return kWords[static_cast<std::size_t>(severity)];
 }
 
 }  // namespace

@@ -796,10 +796,6 @@ void check_twin(const RecordCheck& check, const BundleParts& parts, const Sectio
 }
 
 void check_shadow(const RecordCheck& check, const BundleParts& parts, const SectionEntry& entry) {
-  if (entry.owner >= parts.scenes.size() || entry.variant != 0) {
-    return check.fault(Rule::kSectionOwner, &entry.owner,
-                       "scene " + std::to_string(entry.owner) + " is not there");
-  }
   const std::span<const std::byte> bytes = section_bytes(parts, entry);
   if (bytes.size() < sizeof(ShadowHeader)) {
     return check.fault(Rule::kScene, &entry.size, "its shadow is too small for its header");
@@ -819,10 +815,6 @@ void check_shadow(const RecordCheck& check, const BundleParts& parts, const Sect
 }
 
 void check_colours(const RecordCheck& check, const BundleParts& parts, const SectionEntry& entry) {
-  if (entry.owner >= parts.patterns.size() || entry.variant != 0) {
-    return check.fault(Rule::kSectionOwner, &entry.owner,
-                       "pattern " + std::to_string(entry.owner) + " is not there");
-  }
   const std::span<const std::byte> bytes = section_bytes(parts, entry);
   if (bytes.size() < sizeof(ColourGridHeader)) {
     return check.fault(Rule::kPattern, &entry.size, "its colours are too few for their header");
@@ -840,10 +832,6 @@ void check_colours(const RecordCheck& check, const BundleParts& parts, const Sec
 }
 
 void check_shape(const RecordCheck& check, const BundleParts& parts, const SectionEntry& entry) {
-  if (entry.owner >= parts.patterns.size() || entry.variant != 0) {
-    return check.fault(Rule::kSectionOwner, &entry.owner,
-                       "pattern " + std::to_string(entry.owner) + " is not there");
-  }
   const PatternRecord& pattern = parts.patterns[entry.owner];
   PatternSurface surface;
   const char* fault =
@@ -862,10 +850,6 @@ void check_shape(const RecordCheck& check, const BundleParts& parts, const Secti
 /// What a walk needs to stay in its bytes: check_bundle() sees whether it is a tree.
 void check_draw_order(const RecordCheck& check, const BundleParts& parts,
                       const SectionEntry& entry) {
-  if (entry.owner >= parts.chunks.own().size() || entry.variant != 0) {
-    return check.fault(Rule::kSectionOwner, &entry.owner,
-                       "chunk " + std::to_string(entry.owner) + " is not there");
-  }
   const std::span<const std::byte> bytes = section_bytes(parts, entry);
   const auto* first = reinterpret_cast<const DrawOrderRecord*>(bytes.data());
   const std::span nodes(first, bytes.size() / sizeof(DrawOrderRecord));
@@ -887,45 +871,58 @@ void check_draw_order(const RecordCheck& check, const BundleParts& parts,
   }
 }
 
-/// Sections that belong to a record: the record is there, and so is the parameter set.
-void check_owned_sections(FaultLog& log, const BundleParts& parts) {
-  for (std::uint32_t i = 0; i < parts.sections.size() && !log.stop(); ++i) {
-    const SectionEntry& entry = parts.sections[i];
-    const RecordCheck check(log, parts, "section", i);
-    const auto type = static_cast<SectionType>(entry.type);
-    if (type == SectionType::kTextureData) {
-      if (entry.owner >= parts.textures.size() || entry.variant != 0) {
-        check.fault(Rule::kSectionOwner, &entry.owner,
-                    "texture " + std::to_string(entry.owner) + " is not there");
-      }
-    } else if (type == SectionType::kMappedFeatures || type == SectionType::kFeatureYml) {
-      const std::uint32_t set = find_parameter_set(parts.parameter_sets, entry.variant);
-      if (entry.owner >= parts.patterns.size() || set == kNone) {
-        check.fault(Rule::kSectionOwner, &entry.owner,
-                    "pattern " + std::to_string(entry.owner) + " or parameter set " +
-                        std::to_string(entry.variant) + " is not there");
-      } else if (type == SectionType::kMappedFeatures) {
-        check_twin(check, parts, entry, parts.parameter_sets[set]);
-      }
-    } else if (type == SectionType::kPatternColours) {
-      check_colours(check, parts, entry);
-    } else if (type == SectionType::kPatternShape) {
-      check_shape(check, parts, entry);
-    } else if (type == SectionType::kShadow) {
-      check_shadow(check, parts, entry);
-    } else if (type == SectionType::kDrawOrder) {
-      check_draw_order(check, parts, entry);
-    } else if (type == SectionType::kMediaData) {
-      if (entry.owner >= parts.media.size() || entry.variant != 0) {
-        check.fault(Rule::kSectionOwner, &entry.owner,
-                    "media " + std::to_string(entry.owner) + " is not there");
-      }
-    } else if (type == SectionType::kTrackerRecord) {
-      if (entry.owner >= parts.patterns.size() || entry.variant != 0) {
-        check.fault(Rule::kSectionOwner, &entry.owner,
-                    "pattern " + std::to_string(entry.owner) + " is not there");
-      }
-    }
+/// What a section's owner may be.
+struct Owners {
+  const char* name;
+  std::uint32_t count;
+};
+
+Owners owners_of(const BundleParts& parts, SectionOwner owner) {
+  switch (owner) {
+    case SectionOwner::kNothing:
+      break;
+    case SectionOwner::kPattern:
+      return {"pattern", parts.patterns.size()};
+    case SectionOwner::kScene:
+      return {"scene", parts.scenes.size()};
+    case SectionOwner::kChunk:
+      return {"chunk", parts.chunks.own().size()};
+    case SectionOwner::kTexture:
+      return {"texture", parts.textures.size()};
+    case SectionOwner::kMedia:
+      return {"media", parts.media.size()};
+  }
+  return {};
+}
+
+/// A section that belongs to a record: the record is there, and so is the parameter set.
+void check_owned_section(const RecordCheck& check, const BundleParts& parts,
+                         const SectionEntry& entry) {
+  const SectionInfo* info = section_info(entry.type);
+  if (info == nullptr || info->owner == SectionOwner::kNothing) return;
+  const Owners owners = owners_of(parts, info->owner);
+  const bool features =
+      info->type == SectionType::kMappedFeatures || info->type == SectionType::kFeatureYml;
+  const std::uint32_t set = features ? find_parameter_set(parts.parameter_sets, entry.variant) : 0;
+  if (entry.owner >= owners.count || set == kNone || (!features && entry.variant != 0)) {
+    return check.fault(Rule::kSectionOwner, &entry.owner,
+                       owners.name + (" " + std::to_string(entry.owner)) +
+                           (features ? " or parameter set " + std::to_string(entry.variant) : "") +
+                           " is not there");
+  }
+  switch (info->type) {
+    case SectionType::kMappedFeatures:
+      return check_twin(check, parts, entry, parts.parameter_sets[set]);
+    case SectionType::kPatternColours:
+      return check_colours(check, parts, entry);
+    case SectionType::kPatternShape:
+      return check_shape(check, parts, entry);
+    case SectionType::kShadow:
+      return check_shadow(check, parts, entry);
+    case SectionType::kDrawOrder:
+      return check_draw_order(check, parts, entry);
+    default:
+      return;
   }
 }
 
@@ -1034,7 +1031,9 @@ void validate_assets(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.parameter_sets.size() && !log.stop(); ++i) {
     check_parameter_set(RecordCheck(log, parts, "parameter set", i), parts, i);
   }
-  if (!log.stop()) check_owned_sections(log, parts);
+  for (std::uint32_t i = 0; i < parts.sections.size() && !log.stop(); ++i) {
+    check_owned_section(RecordCheck(log, parts, "section", i), parts, parts.sections[i]);
+  }
   for (std::uint32_t i = 0; i < parts.scenes.size() && !log.stop(); ++i) {
     check_scene(RecordCheck(log, parts, "scene", i), parts, parts.scenes[i]);
   }
