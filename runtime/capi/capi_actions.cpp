@@ -142,10 +142,7 @@ size_t modar_action_address(const modar_bundle* bundle, uint32_t action, char* t
 }
 
 modar_actions* modar_actions_create(const modar_bundle* bundle, modar_error* error) {
-  if (bundle == nullptr) {
-    modar::hand_over(modar::missing("bundle"), error);
-    return nullptr;
-  }
+  if (bundle == nullptr) return modar::no_handle(modar::missing("bundle"), error);
   auto made = std::make_unique<modar_actions>(
       modar_actions{bundle->view, modar::ActionMachine(bundle->view), {}, {}, {}});
   made->events.reserve(bundle->view.patterns().size() + 2 * bundle->view.nodes().size());

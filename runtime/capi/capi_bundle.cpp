@@ -20,6 +20,7 @@
 
 using modar::copy_name;
 using modar::hand_over;
+using modar::no_handle;
 
 namespace {
 
@@ -30,10 +31,7 @@ constexpr double kOrbitMargin = 1.06;
 
 modar_bundle* opened(modar::MappedFile file, std::span<const std::byte> bytes, modar_error* error) {
   auto view = modar::BundleView::open(bytes);
-  if (!view) {
-    hand_over(view.error(), error);
-    return nullptr;
-  }
+  if (!view) return no_handle(view.error(), error);
   return new modar_bundle{std::move(file), {}, *view};
 }
 
@@ -47,41 +45,27 @@ uint32_t modar_version(void) {
 }
 
 modar_bundle* modar_bundle_open(const char* path, modar_error* error) {
-  if (path == nullptr) {
-    hand_over(modar::missing("path"), error);
-    return nullptr;
-  }
+  if (path == nullptr) return no_handle(modar::missing("path"), error);
   auto file = modar::MappedFile::open(path);
-  if (!file) {
-    hand_over(file.error(), error);
-    return nullptr;
-  }
+  if (!file) return no_handle(file.error(), error);
   const std::span<const std::byte> bytes = file->bytes();
   return opened(std::move(*file), bytes, error);
 }
 
 modar_bundle* modar_bundle_open_fd(int fd, int64_t offset, int64_t length, modar_error* error) {
-  if (offset < 0 || length < 0) {
-    hand_over(
+  if (offset < 0 || length < 0)
+    return no_handle(
         {modar::ExitCode::kUsage, "io.range", "offset", "is negative", "pass the asset's own"},
         error);
-    return nullptr;
-  }
   auto file = modar::MappedFile::open(fd, static_cast<std::uint64_t>(offset),
                                       static_cast<std::uint64_t>(length));
-  if (!file) {
-    hand_over(file.error(), error);
-    return nullptr;
-  }
+  if (!file) return no_handle(file.error(), error);
   const std::span<const std::byte> bytes = file->bytes();
   return opened(std::move(*file), bytes, error);
 }
 
 modar_bundle* modar_bundle_open_bytes(const void* bytes, size_t size, modar_error* error) {
-  if (bytes == nullptr) {
-    hand_over(modar::missing("bytes"), error);
-    return nullptr;
-  }
+  if (bytes == nullptr) return no_handle(modar::missing("bytes"), error);
   const auto* first = static_cast<const std::byte*>(bytes);
   if (reinterpret_cast<std::uintptr_t>(bytes) % alignof(std::uint64_t) == 0)
     return opened({}, {first, size}, error);

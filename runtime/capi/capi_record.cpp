@@ -10,6 +10,7 @@
 #include "runtime/capi/handles.hpp"
 
 using modar::hand_over;
+using modar::no_handle;
 
 namespace {
 
@@ -33,24 +34,16 @@ modar_record* copied(std::span<const std::byte> bytes) {
 
 modar_record* modar_record_create(const uint8_t* gray, size_t stride, int width, int height,
                                   modar_error* error) {
-  if (gray == nullptr) {
-    hand_over(modar::missing("gray"), error);
-    return nullptr;
-  }
-  if (width < 1 || stride < static_cast<std::size_t>(width)) {
-    hand_over({modar::ExitCode::kUsage, "capi.stride", "stride", "is shorter than a row",
-               "pass the bytes from one row to the next"},
-              error);
-    return nullptr;
-  }
+  if (gray == nullptr) return no_handle(modar::missing("gray"), error);
+  if (width < 1 || stride < static_cast<std::size_t>(width))
+    return no_handle({modar::ExitCode::kUsage, "capi.stride", "stride", "is shorter than a row",
+                      "pass the bytes from one row to the next"},
+                     error);
   double repeated = 0;
   const auto made =
       modar::make_tracker_record({gray, width, height, static_cast<std::ptrdiff_t>(stride)},
                                  modar::TrackerRecordOptions{}, {}, &repeated);
-  if (!made) {
-    hand_over(made.error(), error);
-    return nullptr;
-  }
+  if (!made) return no_handle(made.error(), error);
   if (repeated < kPlain) {
     hand_over(
         {modar::ExitCode::kInvalidInput, "pattern.plain", "the picture",
@@ -69,10 +62,7 @@ const void* modar_record_bytes(const modar_record* record, size_t* size) {
 }
 
 modar_record* modar_record_open(const void* bytes, size_t size, modar_error* error) {
-  if (bytes == nullptr) {
-    hand_over(modar::missing("bytes"), error);
-    return nullptr;
-  }
+  if (bytes == nullptr) return no_handle(modar::missing("bytes"), error);
   modar_record* record = copied({static_cast<const std::byte*>(bytes), size});
   modar::TrackerRecordView view;
   const auto fault =

@@ -148,10 +148,7 @@ modar::CameraPicture frame_of(modar_renderer& renderer, const modar_picture* pic
 
 modar_context* modar_context_create(modar_error* error) {
   auto context = modar::GlContext::create_offscreen();
-  if (!context) {
-    modar::hand_over(context.error(), error);
-    return nullptr;
-  }
+  if (!context) return modar::no_handle(context.error(), error);
   return new modar_context{std::move(*context)};
 }
 
@@ -161,42 +158,27 @@ void modar_context_destroy(modar_context* context) {
 
 modar_renderer* modar_renderer_create(const modar_bundle* bundle, const char* device,
                                       uint64_t gpu_bytes, modar_error* error) {
-  if (bundle == nullptr) {
-    modar::hand_over(modar::missing("bundle"), error);
-    return nullptr;
-  }
+  if (bundle == nullptr) return modar::no_handle(modar::missing("bundle"), error);
   auto made = std::make_unique<modar_renderer>();
   made->view = bundle->view;
   made->device = device == nullptr ? "" : device;
   made->gpu_bytes = gpu_bytes;
   const auto caps = caps_for(made->device, gpu_bytes);
-  if (!caps) {
-    modar::hand_over(caps.error(), error);
-    return nullptr;
-  }
+  if (!caps) return modar::no_handle(caps.error(), error);
   auto renderer = modar::Renderer::create(bundle->view, *caps);
-  if (!renderer) {
-    modar::hand_over(renderer.error(), error);
-    return nullptr;
-  }
+  if (!renderer) return modar::no_handle(renderer.error(), error);
   made->renderer = std::move(*renderer);
   return made.release();
 }
 
 modar_renderer* modar_renderer_create_part(const modar_bundle* bundle, int part, uint64_t gpu_bytes,
                                            modar_error* error) {
-  if (bundle == nullptr) {
-    modar::hand_over(modar::missing("bundle"), error);
-    return nullptr;
-  }
+  if (bundle == nullptr) return modar::no_handle(modar::missing("bundle"), error);
   modar::GlCaps caps = modar::probe_gl_caps();
   caps.gpu_memory = gpu_bytes;
   auto renderer =
       modar::Renderer::create_part(bundle->view, caps, static_cast<modar::Renderer::Part>(part));
-  if (!renderer) {
-    modar::hand_over(renderer.error(), error);
-    return nullptr;
-  }
+  if (!renderer) return modar::no_handle(renderer.error(), error);
   auto made = std::make_unique<modar_renderer>();
   made->view = bundle->view;
   made->renderer = std::move(*renderer);

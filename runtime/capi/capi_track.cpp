@@ -57,10 +57,8 @@ modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar
     return nullptr;
   }
   const modar::Camera ours = modar::camera_of(*camera);
-  if (const auto valid = modar::validate(ours); !valid) {
-    modar::hand_over(valid.error(), error);
-    return nullptr;
-  }
+  if (const auto valid = modar::validate(ours); !valid)
+    return modar::no_handle(valid.error(), error);
   const modar_tracker_options asked = modar::grown(*options);
   modar::PoseLoopOptions how;
   how.async_search = asked.async_search != 0;
@@ -69,10 +67,7 @@ modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar
   how.extended = asked.extended != 0;
   how.estimate_camera = asked.estimate_camera != 0;
   auto loop = modar::PoseLoop::create(bundle->view, ours, how);
-  if (!loop) {
-    modar::hand_over(loop.error(), error);
-    return nullptr;
-  }
+  if (!loop) return modar::no_handle(loop.error(), error);
   const std::size_t patterns = bundle->view.patterns().size();
   const double smooth_ms = std::clamp(asked.smooth_ms, 0.0, 1000.0);
   return new modar_tracker{bundle,

@@ -70,6 +70,12 @@ inline int hand_over(const Result<void>& result, modar_error* to) {
   return result ? 0 : hand_over(result.error(), to);
 }
 
+/// The same, where the answer is a handle: NULL.
+inline std::nullptr_t no_handle(const Error& error, modar_error* to) {
+  hand_over(error, to);
+  return nullptr;
+}
+
 /// The caller's structure in one of this version's size: what an older caller did not know is 0.
 template <class Struct>
 Struct grown(const Struct& theirs) {
