@@ -402,6 +402,20 @@ void put(Writer& json, const char* key, std::uint64_t number) {
   json.Uint64(number);
 }
 
+/// A document of that format, whose other members `fill` puts.
+template <class Fill>
+std::string document_text(const char* format, const Fill& fill) {
+  rapidjson::StringBuffer buffer;
+  Writer json(buffer);
+  json.SetIndent(' ', 1);
+  json.StartObject();
+  put(json, "format", format);
+  put(json, "format_version", std::uint64_t{1});
+  fill(json);
+  json.EndObject();
+  return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
+}
+
 void write_bundle(Writer& json, const ReleaseBundle& bundle) {
   json.StartObject();
   put(json, "name", bundle.name);
@@ -455,22 +469,16 @@ Result<Release> parse_release(std::string_view json) {
 }
 
 std::string release_text(const Release& release) {
-  rapidjson::StringBuffer buffer;
-  Writer json(buffer);
-  json.SetIndent(' ', 1);
-  json.StartObject();
-  put(json, "format", kReleaseFormat);
-  put(json, "format_version", std::uint64_t{1});
-  if (release.epoch != 0) put(json, "epoch", release.epoch);
-  put(json, "version", release.version);
-  put(json, "expires", time_text(release.expires));
-  if (release.fresh_days != 0) put(json, "fresh_days", release.fresh_days);
-  json.Key("bundles");
-  json.StartArray();
-  for (const ReleaseBundle& bundle : release.bundles) write_bundle(json, bundle);
-  json.EndArray();
-  json.EndObject();
-  return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
+  return document_text(kReleaseFormat, [&](Writer& json) {
+    if (release.epoch != 0) put(json, "epoch", release.epoch);
+    put(json, "version", release.version);
+    put(json, "expires", time_text(release.expires));
+    if (release.fresh_days != 0) put(json, "fresh_days", release.fresh_days);
+    json.Key("bundles");
+    json.StartArray();
+    for (const ReleaseBundle& bundle : release.bundles) write_bundle(json, bundle);
+    json.EndArray();
+  });
 }
 
 std::string lower_case(std::string_view name) {
@@ -551,18 +559,12 @@ Result<Freshness> parse_freshness(std::string_view text) {
 }
 
 std::string freshness_text(const Freshness& freshness) {
-  rapidjson::StringBuffer buffer;
-  Writer json(buffer);
-  json.SetIndent(' ', 1);
-  json.StartObject();
-  put(json, "format", kFreshFormat);
-  put(json, "format_version", std::uint64_t{1});
-  if (freshness.epoch != 0) put(json, "epoch", freshness.epoch);
-  put(json, "version", freshness.version);
-  put(json, "time", time_text(freshness.time));
-  put(json, "expires", time_text(freshness.expires));
-  json.EndObject();
-  return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
+  return document_text(kFreshFormat, [&](Writer& json) {
+    if (freshness.epoch != 0) put(json, "epoch", freshness.epoch);
+    put(json, "version", freshness.version);
+    put(json, "time", time_text(freshness.time));
+    put(json, "expires", time_text(freshness.expires));
+  });
 }
 
 Result<KeyLink> parse_key_link(std::string_view json) {
@@ -576,16 +578,10 @@ Result<KeyLink> parse_key_link(std::string_view json) {
 }
 
 std::string key_link_text(const KeyLink& link) {
-  rapidjson::StringBuffer buffer;
-  Writer json(buffer);
-  json.SetIndent(' ', 1);
-  json.StartObject();
-  put(json, "format", kKeyFormat);
-  put(json, "format_version", std::uint64_t{1});
-  put(json, "serial", std::uint64_t{link.serial});
-  put(json, "key", link.key);
-  json.EndObject();
-  return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
+  return document_text(kKeyFormat, [&](Writer& json) {
+    put(json, "serial", std::uint64_t{link.serial});
+    put(json, "key", link.key);
+  });
 }
 
 Result<RootWord> parse_root_word(std::string_view json) {
@@ -601,17 +597,11 @@ Result<RootWord> parse_root_word(std::string_view json) {
 }
 
 std::string root_word_text(const RootWord& word) {
-  rapidjson::StringBuffer buffer;
-  Writer json(buffer);
-  json.SetIndent(' ', 1);
-  json.StartObject();
-  put(json, "format", kRootFormat);
-  put(json, "format_version", std::uint64_t{1});
-  put(json, "epoch", word.epoch);
-  put(json, "links", std::uint64_t{word.links});
-  put(json, "key", word.key);
-  json.EndObject();
-  return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
+  return document_text(kRootFormat, [&](Writer& json) {
+    put(json, "epoch", word.epoch);
+    put(json, "links", std::uint64_t{word.links});
+    put(json, "key", word.key);
+  });
 }
 
 std::string root_link_path(std::uint32_t serial) {
@@ -633,16 +623,10 @@ Result<RootLink> parse_root_link(std::string_view json) {
 }
 
 std::string root_link_text(const RootLink& link) {
-  rapidjson::StringBuffer buffer;
-  Writer json(buffer);
-  json.SetIndent(' ', 1);
-  json.StartObject();
-  put(json, "format", kRootLinkFormat);
-  put(json, "format_version", std::uint64_t{1});
-  put(json, "serial", std::uint64_t{link.serial});
-  put(json, "roots", root_set_line(link.roots));
-  json.EndObject();
-  return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
+  return document_text(kRootLinkFormat, [&](Writer& json) {
+    put(json, "serial", std::uint64_t{link.serial});
+    put(json, "roots", root_set_line(link.roots));
+  });
 }
 
 }  // namespace modar
