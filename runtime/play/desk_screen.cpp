@@ -2,6 +2,7 @@
 // here.
 #include <algorithm>
 #include <cstdlib>
+#include <iterator>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -40,58 +41,27 @@ tl::unexpected<Error> no_window() {
               "start it on a desktop, or leave out --window and use --out");
 }
 
-bool act_of(SDL_Keycode key, Act& act) {
-  switch (key) {
-    case SDLK_ESCAPE:
-    case SDLK_q:
-      act = Act::kQuit;
-      return true;
-    case SDLK_m:
-    case SDLK_RIGHT:
-      act = Act::kNextModel;
-      return true;
-    case SDLK_LEFT:
-      act = Act::kPreviousModel;
-      return true;
-    case SDLK_p:
-      act = Act::kNextPattern;
-      return true;
-    case SDLK_PLUS:
-    case SDLK_EQUALS:
-    case SDLK_UP:
-      act = Act::kLarger;
-      return true;
-    case SDLK_MINUS:
-    case SDLK_DOWN:
-      act = Act::kSmaller;
-      return true;
-    case SDLK_d:
-      act = Act::kDisplay;
-      return true;
-    case SDLK_o:
-      act = Act::kOutline;
-      return true;
-    case SDLK_SPACE:
-      act = Act::kPause;
-      return true;
-    case SDLK_f:
-      act = Act::kFreeze;
-      return true;
-    case SDLK_s:
-      act = Act::kSound;
-      return true;
-    case SDLK_c:
-      act = Act::kCaptions;
-      return true;
-    case SDLK_9:
-      act = Act::kQuieter;
-      return true;
-    case SDLK_0:
-      act = Act::kLouder;
-      return true;
-    default:
-      return false;
-  }
+struct KeyAct {
+  SDL_Keycode key;
+  Act act;
+};
+constexpr KeyAct kKeys[] = {
+    {SDLK_ESCAPE, Act::kQuit},        {SDLK_q, Act::kQuit},
+    {SDLK_m, Act::kNextModel},        {SDLK_RIGHT, Act::kNextModel},
+    {SDLK_LEFT, Act::kPreviousModel}, {SDLK_p, Act::kNextPattern},
+    {SDLK_PLUS, Act::kLarger},        {SDLK_EQUALS, Act::kLarger},
+    {SDLK_UP, Act::kLarger},          {SDLK_MINUS, Act::kSmaller},
+    {SDLK_DOWN, Act::kSmaller},       {SDLK_d, Act::kDisplay},
+    {SDLK_o, Act::kOutline},          {SDLK_SPACE, Act::kPause},
+    {SDLK_f, Act::kFreeze},           {SDLK_s, Act::kSound},
+    {SDLK_c, Act::kCaptions},         {SDLK_9, Act::kQuieter},
+    {SDLK_0, Act::kLouder},
+};
+
+/// Nothing: the key has no meaning.
+const KeyAct* act_of(SDL_Keycode key) {
+  const auto* found = std::ranges::find(kKeys, key, &KeyAct::key);
+  return found == std::end(kKeys) ? nullptr : found;
 }
 
 /// Window coordinates to pixels of the picture, which stands in the window's middle as large as it
@@ -156,8 +126,8 @@ std::span<const UserAct> Window::acts(std::chrono::milliseconds limit) {
       state_->lost = true;
     } else if (event.type == SDL_QUIT) {
       state_->acts.push_back({Act::kQuit, {}});
-    } else if (event.type == SDL_KEYDOWN && act_of(event.key.keysym.sym, act.act)) {
-      state_->acts.push_back(act);
+    } else if (event.type == SDL_KEYDOWN) {
+      if (const KeyAct* key = act_of(event.key.keysym.sym)) state_->acts.push_back({key->act, {}});
     } else if (event.type == SDL_MOUSEBUTTONDOWN && event.button.button == SDL_BUTTON_LEFT) {
       act.act = Act::kClick;
       act.at = picture_point(state_->window, state_->picture, event.button.x, event.button.y);

@@ -57,7 +57,17 @@ using Writer = rapidjson::Writer<rapidjson::StringBuffer>;
 void text(Writer& writer, std::string_view value) {
   writer.String(value.data(), static_cast<rapidjson::SizeType>(value.size()));
 }
+void text(Writer& writer, const char* key, std::string_view value) {
+  writer.Key(key);
+  text(writer, value);
+}
 
+void count(Writer& writer, const char* key, std::uint64_t value) {
+  writer.Key(key);
+  writer.Uint64(value);
+}
+
+/// null where it is not finite.
 void number(Writer& writer, double value) {
   if (std::isfinite(value)) {
     writer.Double(value);
@@ -65,118 +75,139 @@ void number(Writer& writer, double value) {
     writer.Null();
   }
 }
+void number(Writer& writer, const char* key, double value) {
+  writer.Key(key);
+  number(writer, value);
+}
 
-/// Times are worth three decimals.
-void rounded(Writer& writer, double value) {
-  number(writer, std::round(value * 1000.0) / 1000.0);
+/// To three decimals, which times are worth.
+void rounded(Writer& writer, const char* key, double value) {
+  number(writer, key, std::round(value * 1000.0) / 1000.0);
+}
+
+/// An object under a key, whose members `fill` writes.
+template <class Fill>
+void object(Writer& writer, const char* key, const Fill& fill) {
+  writer.Key(key);
+  writer.StartObject();
+  fill();
+  writer.EndObject();
+}
+
+/// An array under a key, whose elements `fill` writes.
+template <class Fill>
+void array(Writer& writer, const char* key, const Fill& fill) {
+  writer.Key(key);
+  writer.StartArray();
+  fill();
+  writer.EndArray();
+}
+
+/// An object whose members fill(writer) writes, without a line's end.
+template <class Fill>
+std::string json_line(const Fill& fill) {
+  rapidjson::StringBuffer buffer;
+  Writer writer(buffer);
+  writer.StartObject();
+  fill(writer);
+  writer.EndObject();
+  return {buffer.GetString(), buffer.GetSize()};
 }
 
 /// Of the unit square to the corners.
 void homography(Writer& writer, const std::array<glm::dvec2, 4>& corners) {
   constexpr std::array<glm::dvec2, 4> kSquare = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
-  writer.Key("homography");
   const auto map = homography_from_points(kSquare, corners);
   if (!map) {
+    writer.Key("homography");
     writer.Null();
     return;
   }
-  writer.StartArray();
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) number(writer, (*map)[column][row]);
-  }
-  writer.EndArray();
+  array(writer, "homography", [&] {
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) number(writer, (*map)[column][row]);
+    }
+  });
 }
 
 void detection(Writer& writer, const Detection& seen, std::span<const std::string> names,
                bool homographies) {
   writer.StartObject();
-  writer.Key("pattern");
-  text(writer, seen.pattern < names.size() ? std::string_view(names[seen.pattern]) : "");
-  writer.Key("corners");
-  writer.StartArray();
-  for (const glm::dvec2& corner : seen.corners) {
-    writer.StartArray();
-    number(writer, corner.x);
-    number(writer, corner.y);
-    writer.EndArray();
-  }
-  writer.EndArray();
-  writer.Key("rotation");
-  writer.StartArray();
-  for (int row = 0; row < 3; ++row) {
-    // GLM's first index is the column.
-    for (int column = 0; column < 3; ++column) number(writer, seen.pose.rotation[column][row]);
-  }
-  writer.EndArray();
-  writer.Key("translation");
-  writer.StartArray();
-  for (int i = 0; i < 3; ++i) number(writer, seen.pose.translation[i]);
-  writer.EndArray();
-  if (seen.stretch != glm::dmat4x3(1.0)) {
-    writer.Key("stretch");
-    writer.StartArray();
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 4; ++column) number(writer, seen.stretch[column][row]);
+  text(writer, "pattern", seen.pattern < names.size() ? std::string_view(names[seen.pattern]) : "");
+  array(writer, "corners", [&] {
+    for (const glm::dvec2& corner : seen.corners) {
+      writer.StartArray();
+      number(writer, corner.x);
+      number(writer, corner.y);
+      writer.EndArray();
     }
-    writer.EndArray();
+  });
+  array(writer, "rotation", [&] {
+    for (int row = 0; row < 3; ++row) {
+      // GLM's first index is the column.
+      for (int column = 0; column < 3; ++column) {
+        number(writer, seen.pose.rotation[column][row]);
+      }
+    }
+  });
+  array(writer, "translation", [&] {
+    for (int i = 0; i < 3; ++i) number(writer, seen.pose.translation[i]);
+  });
+  if (seen.stretch != glm::dmat4x3(1.0)) {
+    array(writer, "stretch", [&] {
+      for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 4; ++column) number(writer, seen.stretch[column][row]);
+      }
+    });
   }
-  writer.Key("inliers");
-  writer.Int(seen.inliers);
-  writer.Key("matches");
-  writer.Int(seen.matches);
-  writer.Key("fit");
-  rounded(writer, seen.matches > 0 ? std::min(1.0, 1.0 * seen.inliers / seen.matches) : 0.0);
-  writer.Key("agreeing");
-  rounded(writer, seen.agreeing);
-  writer.Key("likeness");
-  rounded(writer, seen.likeness);
+  count(writer, "inliers", static_cast<std::uint64_t>(seen.inliers));
+  count(writer, "matches", static_cast<std::uint64_t>(seen.matches));
+  rounded(writer, "fit", seen.matches > 0 ? std::min(1.0, 1.0 * seen.inliers / seen.matches) : 0.0);
+  rounded(writer, "agreeing", seen.agreeing);
+  rounded(writer, "likeness", seen.likeness);
   if (seen.extended) {
     writer.Key("extended");
     writer.Bool(true);
-    writer.Key("position_sigma");
-    number(writer, seen.position_sigma);
-    writer.Key("rotation_sigma");
-    number(writer, seen.rotation_sigma);
+    number(writer, "position_sigma", seen.position_sigma);
+    number(writer, "rotation_sigma", seen.rotation_sigma);
   }
   if (homographies) homography(writer, seen.corners);
   writer.EndObject();
 }
 
 void camera(Writer& writer, const CameraReport& camera) {
-  writer.Key("camera");
-  writer.StartObject();
-  writer.Key("focal_px");
-  rounded(writer, camera.focal.focal);
-  if (camera.focal.estimated) {
-    writer.Key("sigma_px");
-    rounded(writer, camera.focal.sigma);
-  }
-  writer.Key("source");
-  writer.String(camera.given ? "given" : camera.focal.estimated ? "estimated" : "assumed");
-  writer.EndObject();
+  object(writer, "camera", [&] {
+    rounded(writer, "focal_px", camera.focal.focal);
+    if (camera.focal.estimated) rounded(writer, "sigma_px", camera.focal.sigma);
+    text(writer, "source",
+         camera.given             ? "given"
+         : camera.focal.estimated ? "estimated"
+                                  : "assumed");
+  });
 }
 
 void times(Writer& writer, const StageTimes& ms) {
-  writer.Key("ms");
-  writer.StartObject();
-  for (std::size_t i = 0; i < ms.size(); ++i) {
-    writer.Key(kStageNames[i]);
-    rounded(writer, ms[i]);
-  }
-  writer.EndObject();
+  object(writer, "ms", [&] {
+    for (std::size_t i = 0; i < ms.size(); ++i) rounded(writer, kStageNames[i], ms[i]);
+  });
+}
+
+/// Of frames, by the reason why nothing was visible.
+void reasons(Writer& writer, const RunStats& stats) {
+  object(writer, "reasons", [&] {
+    for (const Reason reason : kReasons) {
+      if (stats.count(reason) > 0) count(writer, to_string(reason), stats.count(reason));
+    }
+  });
 }
 
 void scene(Writer& writer, const SceneLog& log) {
   if (!log.commands.empty()) {
-    writer.Key("commands");
-    writer.StartArray();
-    for (const std::string& each : log.commands) text(writer, each);
-    writer.EndArray();
+    array(writer, "commands", [&] {
+      for (const std::string& each : log.commands) text(writer, each);
+    });
   }
-  if (!log.caption.empty()) {
-    writer.Key("caption");
-    text(writer, log.caption);
-  }
+  if (!log.caption.empty()) text(writer, "caption", log.caption);
 }
 
 }  // namespace
@@ -190,162 +221,91 @@ bool draws_in_software(std::string_view gl_renderer) {
 }
 
 const char* to_string(Shown state) {
-  switch (state) {
-    case Shown::kShown:
-      return "shown";
-    case Shown::kHeld:
-      return "held";
-    case Shown::kHidden:
-      break;
-  }
-  return "hidden";
+  constexpr const char* kNames[] = {"shown", "held", "hidden"};
+  return kNames[static_cast<std::size_t>(state)];
 }
 
 std::string frame_line(const FrameReport& report, std::span<const std::string> pattern_names,
                        bool homographies) {
-  rapidjson::StringBuffer buffer;
-  Writer writer(buffer);
-  writer.StartObject();
-  writer.Key("frame");
-  writer.Uint64(report.frame);
-  writer.Key("time_s");
-  number(writer, report.time_s);
-  writer.Key("visible");
-  writer.StartArray();
-  for (const Detection& seen : report.visible) {
-    detection(writer, seen, pattern_names, homographies);
-  }
-  writer.EndArray();
-  writer.Key("reason");
-  writer.String(to_string(report.reason));
-  writer.Key("state");
-  writer.String(to_string(report.state));
-  if (report.scene != nullptr) scene(writer, *report.scene);
-  camera(writer, report.camera);
-  times(writer, report.ms);
-  writer.EndObject();
-  return {buffer.GetString(), buffer.GetSize()};
+  return json_line([&](Writer& writer) {
+    count(writer, "frame", report.frame);
+    number(writer, "time_s", report.time_s);
+    array(writer, "visible", [&] {
+      for (const Detection& seen : report.visible) {
+        detection(writer, seen, pattern_names, homographies);
+      }
+    });
+    text(writer, "reason", to_string(report.reason));
+    text(writer, "state", to_string(report.state));
+    if (report.scene != nullptr) scene(writer, *report.scene);
+    camera(writer, report.camera);
+    times(writer, report.ms);
+  });
 }
 
 std::string summary_line(const RunStats& stats) {
-  rapidjson::StringBuffer buffer;
-  Writer writer(buffer);
-  writer.StartObject();
-  writer.Key("summary");
-  writer.StartObject();
-  writer.Key("frames");
-  writer.Uint64(stats.frames());
-  writer.Key("dropped");
-  writer.Uint64(stats.dropped());
-  writer.Key("visible");
-  writer.Uint64(stats.visible());
-  writer.Key("recognised_percent");
-  number(writer, stats.recognised_percent());
-  writer.Key("states");
-  writer.StartObject();
-  for (const Shown state : {Shown::kShown, Shown::kHeld, Shown::kHidden}) {
-    writer.Key(to_string(state));
-    writer.Uint64(stats.count(state));
-  }
-  writer.EndObject();
-  writer.Key("reasons");
-  writer.StartObject();
-  for (const Reason reason : kReasons) {
-    if (stats.count(reason) == 0) continue;
-    writer.Key(to_string(reason));
-    writer.Uint64(stats.count(reason));
-  }
-  writer.EndObject();
-  writer.Key("late");
-  writer.Uint64(stats.late());
-  if (stats.camera()) camera(writer, *stats.camera());
-  times(writer, stats.median_ms());
-  writer.EndObject();
-  writer.EndObject();
-  return {buffer.GetString(), buffer.GetSize()};
+  return json_line([&](Writer& writer) {
+    object(writer, "summary", [&] {
+      count(writer, "frames", stats.frames());
+      count(writer, "dropped", stats.dropped());
+      count(writer, "visible", stats.visible());
+      number(writer, "recognised_percent", stats.recognised_percent());
+      object(writer, "states", [&] {
+        for (const Shown state : {Shown::kShown, Shown::kHeld, Shown::kHidden}) {
+          count(writer, to_string(state), stats.count(state));
+        }
+      });
+      reasons(writer, stats);
+      count(writer, "late", stats.late());
+      if (stats.camera()) camera(writer, *stats.camera());
+      times(writer, stats.median_ms());
+    });
+  });
 }
 
 std::string turntable_line(const TurntableReport& report) {
-  rapidjson::StringBuffer buffer;
-  Writer writer(buffer);
-  writer.StartObject();
-  writer.Key("frame");
-  writer.Uint64(report.frame);
-  writer.Key(report.pattern ? "pattern" : "model");
-  text(writer, report.name);
-  writer.Key("angle_deg");
-  number(writer, report.angle_deg);
-  writer.Key("triangles");
-  writer.Uint64(report.triangles);
-  writer.Key("draw_calls");
-  writer.Int(report.draw_calls);
-  writer.Key("ms");
-  writer.StartObject();
-  writer.Key("render");
-  rounded(writer, report.render_ms);
-  writer.EndObject();
-  writer.EndObject();
-  return {buffer.GetString(), buffer.GetSize()};
+  return json_line([&](Writer& writer) {
+    count(writer, "frame", report.frame);
+    text(writer, report.pattern ? "pattern" : "model", report.name);
+    number(writer, "angle_deg", report.angle_deg);
+    count(writer, "triangles", report.triangles);
+    count(writer, "draw_calls", static_cast<std::uint64_t>(report.draw_calls));
+    object(writer, "ms", [&] { rounded(writer, "render", report.render_ms); });
+  });
 }
 
 namespace {
 
-void text(Writer& writer, const char* key, std::string_view value) {
-  writer.Key(key);
-  writer.String(value.data(), static_cast<rapidjson::SizeType>(value.size()));
-}
-
-void count(Writer& writer, const char* key, std::uint64_t value) {
-  writer.Key(key);
-  writer.Uint64(value);
-}
-
-void number(Writer& writer, const char* key, double value) {
-  writer.Key(key);
-  writer.Double(std::isfinite(value) ? std::round(value * 1000) / 1000 : 0);
+/// Of a log: to three decimals, and 0 where it is not finite.
+void figure(Writer& writer, const char* key, double value) {
+  rounded(writer, key, std::isfinite(value) ? value : 0);
 }
 
 void times(Writer& writer, const RunStats& stats) {
   const StageTimes median = stats.quantile_ms(0.5);
   const StageTimes most = stats.quantile_ms(0.95);
   const StageTimes worst = stats.quantile_ms(1);
-  writer.Key("ms");
-  writer.StartObject();
-  for (std::size_t i = 0; i < median.size(); ++i) {
-    writer.Key(kStageNames[i]);
-    writer.StartObject();
-    number(writer, "median", median[i]);
-    number(writer, "p95", most[i]);
-    number(writer, "max", worst[i]);
-    writer.EndObject();
-  }
-  writer.EndObject();
-}
-
-void reasons(Writer& writer, const RunStats& stats) {
-  writer.Key("reasons");
-  writer.StartObject();
-  for (const Reason reason : kReasons) {
-    if (stats.count(reason) > 0) count(writer, to_string(reason), stats.count(reason));
-  }
-  writer.EndObject();
+  object(writer, "ms", [&] {
+    for (std::size_t i = 0; i < median.size(); ++i) {
+      object(writer, kStageNames[i], [&] {
+        figure(writer, "median", median[i]);
+        figure(writer, "p95", most[i]);
+        figure(writer, "max", worst[i]);
+      });
+    }
+  });
 }
 
 void memory_of(Writer& writer, const MemoryByKind& memory) {
-  writer.Key("memory");
-  writer.StartObject();
-  count(writer, "resident", memory.resident);
-  count(writer, "heap", memory.heap);
-  count(writer, "bundle", memory.bundle);
-  count(writer, "bundle_resident", memory.bundle_resident);
-  count(writer, "gpu_geometry", memory.gpu_geometry);
-  count(writer, "gpu_textures", memory.gpu_textures);
-  count(writer, "gpu_batches", memory.gpu_batches);
-  writer.EndObject();
-}
-
-std::string_view view(const rapidjson::StringBuffer& buffer) {
-  return {buffer.GetString(), buffer.GetSize()};
+  object(writer, "memory", [&] {
+    count(writer, "resident", memory.resident);
+    count(writer, "heap", memory.heap);
+    count(writer, "bundle", memory.bundle);
+    count(writer, "bundle_resident", memory.bundle_resident);
+    count(writer, "gpu_geometry", memory.gpu_geometry);
+    count(writer, "gpu_textures", memory.gpu_textures);
+    count(writer, "gpu_batches", memory.gpu_batches);
+  });
 }
 
 /// Second number of /proc/self/statm: resident pages.
@@ -385,24 +345,19 @@ MemoryByKind measure_memory(std::span<const std::byte> mapped) {
 Result<QosLog> QosLog::create(const std::string& path, const QosHead& head, double every_s) {
   MODAR_ASSIGN(AtomicFile file, AtomicFile::create(path));
   QosLog log(std::move(file), every_s);
-  rapidjson::StringBuffer buffer;
-  Writer writer(buffer);
-  writer.StartObject();
-  writer.Key("qos");
-  writer.StartObject();
-  writer.Key("version");
-  writer.Int(1);
-  text(writer, "bundle", head.bundle);
-  text(writer, "input", head.input);
-  text(writer, "method", head.method);
-  text(writer, "parameters", head.parameters);
-  text(writer, "gl_renderer", head.gl_renderer);
-  text(writer, "gl_version", head.gl_version);
-  text(writer, "device", head.device);
-  number(writer, "budget_ms", kFrameBudgetMs);
-  writer.EndObject();
-  writer.EndObject();
-  MODAR_TRY(log.write(view(buffer)));
+  MODAR_TRY(log.write(json_line([&](Writer& writer) {
+    object(writer, "qos", [&] {
+      count(writer, "version", 1);
+      text(writer, "bundle", head.bundle);
+      text(writer, "input", head.input);
+      text(writer, "method", head.method);
+      text(writer, "parameters", head.parameters);
+      text(writer, "gl_renderer", head.gl_renderer);
+      text(writer, "gl_version", head.gl_version);
+      text(writer, "device", head.device);
+      figure(writer, "budget_ms", kFrameBudgetMs);
+    });
+  })));
   return log;
 }
 
@@ -420,48 +375,43 @@ Result<void> QosLog::add(const FrameReport& report, std::span<const std::string>
       if (each.pattern == pattern) detection = &each;
     }
     if (seen_[pattern] == (detection != nullptr)) continue;
-    rapidjson::StringBuffer buffer;
-    Writer writer(buffer);
-    writer.StartObject();
-    text(writer, "event", detection != nullptr ? "found" : "lost");
-    text(writer, "pattern", pattern_names[pattern]);
-    count(writer, "frame", report.frame);
-    number(writer, "time_s", report.time_s);
-    number(writer, "after_s", report.time_s - since_s_[pattern]);
-    if (detection != nullptr) {
-      count(writer, "inliers", static_cast<std::uint64_t>(detection->inliers));
-    } else {
-      text(writer, "reason", to_string(report.reason));
-    }
-    writer.EndObject();
+    const std::string line = json_line([&](Writer& writer) {
+      text(writer, "event", detection != nullptr ? "found" : "lost");
+      text(writer, "pattern", pattern_names[pattern]);
+      count(writer, "frame", report.frame);
+      figure(writer, "time_s", report.time_s);
+      figure(writer, "after_s", report.time_s - since_s_[pattern]);
+      if (detection != nullptr) {
+        count(writer, "inliers", static_cast<std::uint64_t>(detection->inliers));
+      } else {
+        text(writer, "reason", to_string(report.reason));
+      }
+    });
     seen_[pattern] = detection != nullptr;
     since_s_[pattern] = report.time_s;
-    MODAR_TRY(write(view(buffer)));
+    MODAR_TRY(write(line));
   }
   window_.add(report);
   return {};
 }
 
 Result<void> QosLog::window(const MemoryByKind& memory) {
-  rapidjson::StringBuffer buffer;
-  Writer writer(buffer);
-  writer.StartObject();
-  writer.Key("second");
-  writer.StartObject();
-  number(writer, "from_s", window_start_s_);
-  count(writer, "frames", window_.frames());
-  count(writer, "visible", window_.visible());
-  count(writer, "held", window_.count(Shown::kHeld));
-  count(writer, "hidden", window_.count(Shown::kHidden));
-  count(writer, "late", window_.late());
-  reasons(writer, window_);
-  times(writer, window_);
-  memory_of(writer, memory);
-  writer.EndObject();
-  writer.EndObject();
+  const std::string line = json_line([&](Writer& writer) {
+    object(writer, "second", [&] {
+      figure(writer, "from_s", window_start_s_);
+      count(writer, "frames", window_.frames());
+      count(writer, "visible", window_.visible());
+      count(writer, "held", window_.count(Shown::kHeld));
+      count(writer, "hidden", window_.count(Shown::kHidden));
+      count(writer, "late", window_.late());
+      reasons(writer, window_);
+      times(writer, window_);
+      memory_of(writer, memory);
+    });
+  });
   window_ = RunStats();
   window_start_s_ = last_s_;
-  return write(view(buffer));
+  return write(line);
 }
 
 Result<void> QosLog::finish(std::string_view summary) {

@@ -117,24 +117,11 @@ void convert_row(const Row& row, const Weights& weights, int width, std::uint8_t
   }
 }
 
-/// How the renderer calls a layout; kRgb where it cannot draw it.
-PictureFormat picture_format(YuvLayout layout) {
-  switch (layout) {
-    case YuvLayout::kNv21:
-      return PictureFormat::kNv21;
-    case YuvLayout::kNv12:
-      return PictureFormat::kNv12;
-    case YuvLayout::kI420:
-      return PictureFormat::kI420;
-    default:
-      return PictureFormat::kRgb;
-  }
-}
-
-YuvLayout layout_of(PictureFormat format) {
-  if (format == PictureFormat::kNv21) return YuvLayout::kNv21;
-  return format == PictureFormat::kNv12 ? YuvLayout::kNv12 : YuvLayout::kI420;
-}
+/// Layouts that the renderer draws, and how it calls them.
+constexpr std::array<std::pair<YuvLayout, PictureFormat>, 3> kDrawn = {
+    {{YuvLayout::kNv21, PictureFormat::kNv21},
+     {YuvLayout::kNv12, PictureFormat::kNv12},
+     {YuvLayout::kI420, PictureFormat::kI420}}};
 
 void set_size(Frame& frame, const YuvFormat& format) {
   frame.width = format.width;
@@ -213,13 +200,14 @@ void fill_frame(Frame& frame, const YuvFormat& format, std::span<const std::uint
 }
 
 void take_frame(Frame& frame, const YuvFormat& format, std::vector<std::uint8_t>& bytes) {
-  const PictureFormat drawn = picture_format(format.layout);
-  if (drawn == PictureFormat::kRgb || format.width % 2 != 0 || format.height % 2 != 0) {
+  const auto* drawn =
+      std::ranges::find(kDrawn, format.layout, &decltype(kDrawn)::value_type::first);
+  if (drawn == kDrawn.end() || format.width % 2 != 0 || format.height % 2 != 0) {
     fill_frame(frame, format, bytes);
     return;
   }
   set_size(frame, format);
-  frame.format = drawn;
+  frame.format = drawn->second;
   frame.full_range = format.full_range;
   frame.rgb.clear();
   frame.gray.clear();
@@ -229,8 +217,9 @@ void take_frame(Frame& frame, const YuvFormat& format, std::vector<std::uint8_t>
 
 void make_rgb(Frame& frame) {
   if (frame.format == PictureFormat::kRgb || !frame.rgb.empty()) return;
-  fill_rgb(frame, {layout_of(frame.format), frame.width, frame.height, frame.full_range},
-           frame.yuv);
+  const auto* drawn =
+      std::ranges::find(kDrawn, frame.format, &decltype(kDrawn)::value_type::second);
+  fill_rgb(frame, {drawn->first, frame.width, frame.height, frame.full_range}, frame.yuv);
 }
 
 void gray_from_rgb(Frame& frame) {
