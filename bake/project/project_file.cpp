@@ -121,18 +121,27 @@ class TableReader {
     if (node == nullptr || add_numbers(*node, text)) return {};
     return wrong(key, "a list of numbers");
   }
-  /// The tables of an array within, [[name.key]].
+  /// The tables of an array within, [[key]] or [[name.key]].
   [[nodiscard]] Result<std::vector<TableReader>> take_tables(const std::string& key) const {
     std::vector<TableReader> list;
     const toml::node* node = table_.get(key);
     if (node == nullptr) return list;
-    const std::string name = "[[" + name_.substr(2, name_.size() - 4) + "." + key + "]]";
+    const bool nested = name_.starts_with("[[");
+    const std::string name =
+        "[[" + (nested ? name_.substr(2, name_.size() - 4) + "." : "") + key + "]]";
     const auto* array = node->as_array();
     if (array == nullptr || !array->is_homogeneous<toml::table>()) {
       return wrong(key, name + " above each of them");
     }
     for (const auto& element : *array) list.emplace_back(file_, *element.as_table(), name);
     return list;
+  }
+  /// "[key]" of the file, or nothing.
+  [[nodiscard]] Result<std::optional<TableReader>> take_table(const std::string& key) const {
+    const toml::node* node = table_.get(key);
+    if (node == nullptr) return std::nullopt;
+    if (node->as_table() == nullptr) return wrong(key, "[" + key + "] above its keys");
+    return TableReader(file_, *node->as_table(), "[" + key + "]");
   }
   /// Every key of a table within: {"en", "A vase."}.
   Result<void> take(std::string_view key, Words& texts) const {
@@ -156,8 +165,7 @@ class TableReader {
       settings[option.key] = value;
       BakeRequest trial;
       if (auto good = take_option(option, value, trial); !good) {
-        return fail(ExitCode::kInvalidInput, "project.value", at(option.key),
-                    std::string(option.key) + ": " + good.error().cause, good.error().cure);
+        return refused(option.key, "", {good.error().cause, good.error().cure});
       }
     }
     return {};
@@ -175,6 +183,13 @@ class TableReader {
     return fail(ExitCode::kInvalidInput, "project.value", at(key),
                 "'" + std::string(key) + "' in " + name_ + " has the wrong type",
                 "write " + expected);
+  }
+
+  /// assigned: what the value is, as ' = "none"'.
+  [[nodiscard]] tl::unexpected<Error> refused(std::string_view key, const std::string& assigned,
+                                              const WrongValue& why) const {
+    return fail(ExitCode::kInvalidInput, "project.value", at(key),
+                std::string(key) + assigned + ": " + why.cause, why.cure);
   }
 
  private:
@@ -293,33 +308,6 @@ Keys keys_with_settings(Keys keys, std::optional<OptionPart> part) {
   return keys;
 }
 
-/// The tables of an array "[[name]]".
-Result<std::vector<TableReader>> tables(const std::string& file, const toml::table& root,
-                                        const std::string& name) {
-  std::vector<TableReader> list;
-  const toml::node* node = root.get(name);
-  if (node == nullptr) return list;
-  const auto* array = node->as_array();
-  if (array == nullptr || !array->is_homogeneous<toml::table>()) {
-    return TableReader(file, root, "the file").wrong(name, "[[" + name + "]] above each of them");
-  }
-  for (const auto& element : *array) {
-    list.emplace_back(file, *element.as_table(), "[[" + name + "]]");
-  }
-  return list;
-}
-
-/// "[name]", or nothing.
-Result<std::optional<TableReader>> table(const std::string& file, const toml::table& root,
-                                         const std::string& name) {
-  const toml::node* node = root.get(name);
-  if (node == nullptr) return std::nullopt;
-  if (node->as_table() == nullptr) {
-    return TableReader(file, root, "the file").wrong(name, "[" + name + "] above its keys");
-  }
-  return TableReader(file, *node->as_table(), "[" + name + "]");
-}
-
 Error no_toml(const std::string& path, const toml::parse_error& error) {
   return {ExitCode::kInvalidInput, "project.toml", place(path, error.source()),
           std::string(error.description()), "correct the line; see toml.io"};
@@ -330,7 +318,7 @@ class ProjectReader {
   /// problems: receives what is wrong, and the rest is read; nullptr: the first error ends it.
   ProjectReader(const std::string& file, const toml::table& root, bool outside,
                 std::vector<Error>* problems = nullptr)
-      : root_(root), problems_(problems) {
+      : whole_(project_.file, root, "the file"), problems_(problems) {
     project_.file = file;
     project_.outside = outside;
     const fs::path folder = fs::path(file).parent_path();
@@ -338,9 +326,8 @@ class ProjectReader {
   }
 
   Result<Project> run() {
-    const TableReader whole(project_.file, root_, "the file");
     MODAR_TRY(told(
-        whole.allow({"project", "bake", "tier", "model", "pattern", "scene", "bundle", "gates"})));
+        whole_.allow({"project", "bake", "tier", "model", "pattern", "scene", "bundle", "gates"})));
     MODAR_TRY(told(read_project_table()));
     MODAR_TRY(told(read_bake()));
     MODAR_TRY(told(read_assets("model", false, project_.models)));
@@ -349,7 +336,7 @@ class ProjectReader {
     MODAR_TRY(told(read_bundles()));
     MODAR_TRY(told(read_gates()));
     for (const std::string& path : {project_.out, std::string(kCacheFolder)}) {  // may be links
-      MODAR_TRY(told(keep_inside(whole, "project", path)));
+      MODAR_TRY(told(keep_inside(whole_, "project", path)));
     }
     if (project_.models.empty() && project_.patterns.empty()) {
       MODAR_TRY(told(fail(ExitCode::kInvalidInput, "project.empty", project_.file,
@@ -370,7 +357,7 @@ class ProjectReader {
 
   Result<void> read_project_table() {
     name_ = fs::absolute(project_.file).lexically_normal().parent_path().filename().string();
-    MODAR_ASSIGN(const auto reader, table(project_.file, root_, "project"));
+    MODAR_ASSIGN(const auto reader, whole_.take_table("project"));
     if (!reader) return {};
     MODAR_TRY(reader->allow({"name", "out", "cache", "light"}));
     MODAR_TRY(reader->take("name", name_));
@@ -379,7 +366,7 @@ class ProjectReader {
     MODAR_TRY(keep_inside(*reader, "out", project_.out));
     MODAR_TRY(reader->take("cache", project_.cache));
     MODAR_TRY(keep_inside(*reader, "cache", project_.cache));
-    return take_light(*reader, project_.light);
+    return take_file(*reader, "light", project_.light);
   }
 
   /// A name that files get: none of another folder, none that a terminal takes for a command.
@@ -403,12 +390,12 @@ class ProjectReader {
   }
 
   Result<void> read_bake() {
-    MODAR_ASSIGN(const auto reader, table(project_.file, root_, "bake"));
+    MODAR_ASSIGN(const auto reader, whole_.take_table("bake"));
     if (reader) {
       MODAR_TRY(reader->allow(keys_with_settings({}, std::nullopt)));
       MODAR_TRY(reader->take_settings(project_.settings));
     }
-    MODAR_ASSIGN(const auto tiers, tables(project_.file, root_, "tier"));
+    MODAR_ASSIGN(const auto tiers, whole_.take_tables("tier"));
     for (const TableReader& tier : tiers) {
       MODAR_TRY(tier.allow(keys_with_settings({"name"}, std::nullopt)));
       ProjectTier read;
@@ -423,7 +410,7 @@ class ProjectReader {
 
   Result<void> read_assets(const std::string& kind, bool pattern,
                            std::vector<ProjectAsset>& assets) {
-    MODAR_ASSIGN(const auto readers, tables(project_.file, root_, kind));
+    MODAR_ASSIGN(const auto readers, whole_.take_tables(kind));
     Keys keys =
         keys_with_settings({"file", "name"}, pattern ? OptionPart::kPattern : OptionPart::kModel);
     if (pattern) keys.insert(keys.end(), {"width-mm", "height-mm", "corners", "shape"});
@@ -453,7 +440,8 @@ class ProjectReader {
     if (height > 0) text += ",height=" + shortest_text(height) + "mm";
     if (text.empty()) return {};
     auto parsed = parse_shape(text);
-    if (!parsed && corners.empty()) return reader.wrong("height-mm", "it beside corners = [...]");
+    if (!parsed && corners.empty())
+      return reader.wrong("height-mm", "it together with corners = [...]");
     if (!parsed) return reader.wrong("corners", "[[212, 80], [905, 131], [870, 640], [190, 602]]");
     shape = std::move(*parsed);
     return {};
@@ -507,7 +495,7 @@ class ProjectReader {
   }
 
   Result<void> read_scenes() {
-    MODAR_ASSIGN(const auto readers, tables(project_.file, root_, "scene"));
+    MODAR_ASSIGN(const auto readers, whole_.take_tables("scene"));
     for (std::size_t i = 0; i < readers.size(); ++i) MODAR_TRY(told(read_scene(readers[i], i)));
     if (readers.empty()) make_scenes();
     return {};
@@ -532,7 +520,7 @@ class ProjectReader {
     MODAR_TRY(read_placement(reader, scene.request));
     MODAR_TRY(reader.take("centred", scene.request.centred));
     scene.request.light = project_.light;
-    MODAR_TRY(take_light(reader, scene.request.light));
+    MODAR_TRY(take_file(reader, "light", scene.request.light));
     MODAR_TRY(reader.take("text", scene.texts));
     MODAR_TRY(reader.take("alt", scene.alts));
     project_.scenes.push_back(std::move(scene));
@@ -576,8 +564,7 @@ class ProjectReader {
     std::string alpha = "none";
     MODAR_TRY(reader.take("alpha", alpha));
     if (const auto read = parse_alpha(alpha, node); !read) {
-      return fail(ExitCode::kInvalidInput, "project.value", reader.at("alpha"),
-                  "alpha = \"" + alpha + "\": " + read.error().cause, read.error().cure);
+      return reader.refused("alpha", " = \"" + alpha + "\"", read.error());
     }
     return read_plane(reader, std::move(node), scene);
   }
@@ -633,9 +620,8 @@ class ProjectReader {
     node.where = reader.at("name");
     node.place.pattern = scene.request.pattern;
     MODAR_TRY(take_node(reader, node.place));
-    node.mark = std::to_string(
-        1 + std::count_if(scene.nodes.begin(), scene.nodes.end(),
-                          [](const NodeRequest& other) { return other.kind == NodeKind::kLabel; }));
+    node.mark =
+        std::to_string(1 + std::ranges::count(scene.nodes, NodeKind::kLabel, &NodeRequest::kind));
     MODAR_TRY(reader.take("mark", node.mark));
     if (node.place.name.empty()) node.place.name = node.mark;
     if (node.mark.empty() || node.mark.size() > kMostMarkBytes ||
@@ -659,18 +645,14 @@ class ProjectReader {
     MODAR_TRY(reader.take("on", event));
     MODAR_TRY(reader.take("part", action.part));
     MODAR_TRY(reader.take("do", command));
-    const auto wrong = [&](const char* key, const std::string& text, const WrongValue& why) {
-      return fail(ExitCode::kInvalidInput, "project.value", reader.at(key),
-                  std::string(key) + " = \"" + text + "\": " + why.cause, why.cure);
-    };
     if (const auto read = parse_event(event, action); !read) {
-      return wrong("on", event, read.error());
+      return reader.refused("on", " = \"" + event + "\"", read.error());
     }
     if (const auto read = parse_command(command, action); !read) {
-      return wrong("do", command, read.error());
+      return reader.refused("do", " = \"" + command + "\"", read.error());
     }
     if (!action.part.empty() && action.event != ActionEvent::kTap) {
-      return reader.wrong("part", "a part beside on = \"tap MODEL\" only");
+      return reader.wrong("part", "a part only with on = \"tap MODEL\"");
     }
     scene.actions.push_back(std::move(action));
     return {};
@@ -683,8 +665,7 @@ class ProjectReader {
     MODAR_TRY(reader.take_scene_value(key, text));
     const auto taken = take_scene_part(key, text, scene);
     if (taken) return {};
-    return fail(ExitCode::kInvalidInput, "project.value", reader.at(key),
-                std::string(key) + " = " + text + ": " + taken.error().cause, taken.error().cure);
+    return reader.refused(key, " = " + text, taken.error());
   }
 
   static Result<void> read_placement(const TableReader& reader, SceneRequest& scene) {
@@ -695,11 +676,6 @@ class ProjectReader {
       MODAR_TRY(read_part(reader, key, scene));
     }
     return {};
-  }
-
-  /// The picture of a room.
-  Result<void> take_light(const TableReader& reader, std::string& light) const {
-    return take_file(reader, "light", light);
   }
 
   /// A file; relative to the project's folder, as models are.
@@ -745,7 +721,7 @@ class ProjectReader {
   }
 
   Result<void> read_bundles() {
-    MODAR_ASSIGN(const auto readers, tables(project_.file, root_, "bundle"));
+    MODAR_ASSIGN(const auto readers, whole_.take_tables("bundle"));
     for (const TableReader& reader : readers) {
       MODAR_TRY(reader.allow({"name", "models", "patterns"}));
       ProjectBundle bundle;
@@ -760,7 +736,7 @@ class ProjectReader {
   }
 
   Result<void> read_gates() {
-    MODAR_ASSIGN(const auto reader, table(project_.file, root_, "gates"));
+    MODAR_ASSIGN(const auto reader, whole_.take_table("gates"));
     if (!reader) return {};
     MODAR_TRY(reader->allow({"min-psnr", "min-ssim", "min-score", "min-grade", "max-bytes"}));
     MODAR_TRY(reader->take("min-psnr", project_.gates.min_psnr_db, 0));
@@ -780,9 +756,9 @@ class ProjectReader {
     return {};
   }
 
-  const toml::table& root_;
-  std::vector<Error>* problems_;
   Project project_;
+  const TableReader whole_;
+  std::vector<Error>* problems_;
   std::string name_;  // of the only bundle
 };
 
