@@ -24,6 +24,7 @@
 #include "bake/mesh/rays/triangle_tree.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/texture/texture_codec.hpp"
+#include "formats/bundle_writer.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
@@ -201,8 +202,8 @@ class SourceCheck {
 
   Result<SourceFit> run(BakeRequest request, Report& report) {
     MODAR_TRY(name_assets(request));
-    MODAR_ASSIGN(const BundleContent content, build_bundle(request, report));
-    again_ = &content;
+    MODAR_ASSIGN(const std::vector<std::byte> bytes, bake_again(request, report));
+    MODAR_ASSIGN(again_, BundleView::open(bytes));
     const auto unknown = [this](const auto& sources, const auto& assets) {
       return std::any_of(sources.begin(), sources.end(), [&](const auto& source) {
         for (std::uint32_t i = 0; i < assets.size(); ++i) {
@@ -215,9 +216,8 @@ class SourceCheck {
     strange_pattern_ = unknown(request.patterns, bundle_.patterns());
     for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
       const ModelRecord& model = bundle_.models()[m];
-      const auto path = std::find_if(
-          request.models.begin(), request.models.end(),
-          [&](const ModelRequest& source) { return source.name == bundle_.name(model.name); });
+      const auto path =
+          std::ranges::find(request.models, bundle_.name(model.name), &ModelRequest::name);
       if (path == request.models.end()) {
         missing("model", model.name, &model, strange_model_);
         continue;
@@ -232,6 +232,14 @@ class SourceCheck {
   }
 
  private:
+  Result<std::vector<std::byte>> bake_again(const BakeRequest& request, Report& report) {
+    MODAR_ASSIGN(const BundleContent content, build_bundle(request, report));
+    for (const MaterialRecord& material : content.materials) {
+      blended_.push_back(blended(material, content));
+    }
+    return encode_bundle(content);
+  }
+
   void tell(WorkstationRule rule, const std::string& where, const void* place, std::string detail,
             std::optional<Severity> severity = {}) {
     sink_(Issue{
@@ -252,43 +260,46 @@ class SourceCheck {
          Severity::kError);
   }
 
-  [[nodiscard]] std::string_view name_again(NameRef name) const {
-    return std::string_view(again_->names).substr(name.offset, name.length);
+  /// Among what was baked again; kNone: there is none.
+  template <class T>
+  std::uint32_t number_of_namesake(const Table<T>& records, NameRef name) const {
+    for (std::uint32_t i = 0; i < records.size(); ++i) {
+      if (again_.name(records[i].name) == bundle_.name(name)) return i;
+    }
+    return kNone;
   }
 
   template <class T>
-  const T* namesake(const std::vector<T>& records, NameRef name) const {
-    const auto found = std::find_if(records.begin(), records.end(), [&](const T& other) {
-      return name_again(other.name) == bundle_.name(name);
-    });
-    return found != records.end() ? &*found : nullptr;
+  const T* namesake(const Table<T>& records, NameRef name) const {
+    const std::uint32_t number = number_of_namesake(records, name);
+    return number != kNone ? &records[number] : nullptr;
   }
 
   [[nodiscard]] bool same_level(const LevelRecord& a, const LevelRecord& b,
                                 std::uint64_t stride) const {
     return a.vertex_count == b.vertex_count && a.index_count == b.index_count &&
            equal(part(bundle_.vertices(), a.vertex_offset, a.vertex_count * stride),
-                 part(again_->vertices, b.vertex_offset, b.vertex_count * stride)) &&
+                 part(again_.vertices(), b.vertex_offset, b.vertex_count * stride)) &&
            equal(part(bundle_.indices(), a.index_offset, 2ull * a.index_count),
-                 part(again_->indices, b.index_offset, 2ull * b.index_count));
+                 part(again_.indices(), b.index_offset, 2ull * b.index_count));
   }
 
   [[nodiscard]] bool same_model(const ModelRecord& model) const {
-    const ModelRecord* other = namesake(again_->models, model.name);
+    const ModelRecord* other = namesake(again_.models(), model.name);
     if (other == nullptr || other->chunk_count != model.chunk_count) return false;
     const LayoutRecord& layout = bundle_.layouts()[model.layout];
-    if (std::memcmp(&layout, &again_->layouts[other->layout], sizeof layout) != 0) return false;
+    if (std::memcmp(&layout, &again_.layouts()[other->layout], sizeof layout) != 0) return false;
     // From the centre to the counts: placement, errors, counts.
     constexpr std::size_t kFrom = offsetof(ModelRecord, center);
     constexpr std::size_t kSize = offsetof(ModelRecord, layout) - kFrom;
     if (std::memcmp(&model.center, &other->center, kSize) != 0) return false;
     for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
       const ChunkRecord& a = bundle_.chunks()[model.first_chunk + c];
-      const ChunkRecord& b = again_->chunks[other->first_chunk + c];
+      const ChunkRecord& b = again_.chunks()[other->first_chunk + c];
       if (std::memcmp(&a, &b, offsetof(ChunkRecord, material)) != 0) return false;
       if (a.level_count != b.level_count) return false;
       for (std::uint32_t l = 0; l < a.level_count; ++l) {
-        if (!same_level(bundle_.levels()[a.first_level + l], again_->levels[b.first_level + l],
+        if (!same_level(bundle_.levels()[a.first_level + l], again_.levels()[b.first_level + l],
                         layout.stride)) {
           return false;
         }
@@ -297,37 +308,25 @@ class SourceCheck {
     return same_stand_ins(model, *other);
   }
 
-  /// Chunks and levels of stand-ins, of a model and of it baked again.
+  /// Chunks and levels of a model's stand-ins.
   using StandInChunks = std::vector<std::pair<const ChunkRecord*, const LevelRecord*>>;
 
-  [[nodiscard]] StandInChunks stand_in_chunks(const ModelRecord& model) const {
+  static StandInChunks stand_in_chunks(const BundleView& bundle, const ModelRecord& model) {
     StandInChunks found;
-    for (std::uint32_t g = bundle_.models().size(); g < bundle_.chunk_groups(); ++g) {
-      const ChunkGroup group = bundle_.chunk_group(g);
-      if (&bundle_.models()[group.model] != &model) continue;
+    for (std::uint32_t g = bundle.models().size(); g < bundle.chunk_groups(); ++g) {
+      const ChunkGroup group = bundle.chunk_group(g);
+      if (&bundle.models()[group.model] != &model) continue;
       for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
-        const ChunkRecord& chunk = bundle_.chunks()[group.first_chunk + c];
-        found.emplace_back(&chunk, &bundle_.levels()[chunk.first_level]);
-      }
-    }
-    return found;
-  }
-
-  [[nodiscard]] StandInChunks stand_in_chunks_again(const ModelRecord& model) const {
-    StandInChunks found;
-    for (const StandInRecord& stand_in : again_->stand_ins) {
-      if (&again_->models[stand_in.model] != &model) continue;
-      for (std::uint32_t c = 0; c < stand_in.chunk_count; ++c) {
-        const ChunkRecord& chunk = again_->stand_in_chunks[stand_in.first_chunk + c];
-        found.emplace_back(&chunk, &again_->stand_in_levels[chunk.first_level]);
+        const ChunkRecord& chunk = bundle.chunks()[group.first_chunk + c];
+        found.emplace_back(&chunk, &bundle.levels()[chunk.first_level]);
       }
     }
     return found;
   }
 
   [[nodiscard]] bool same_stand_ins(const ModelRecord& model, const ModelRecord& other) const {
-    const StandInChunks ours = stand_in_chunks(model);
-    const StandInChunks theirs = stand_in_chunks_again(other);
+    const StandInChunks ours = stand_in_chunks(bundle_, model);
+    const StandInChunks theirs = stand_in_chunks(again_, other);
     const std::uint64_t stride = bundle_.layouts()[model.layout].stride;
     return std::equal(
         ours.begin(), ours.end(), theirs.begin(), theirs.end(), [&](const auto& a, const auto& b) {
@@ -338,14 +337,14 @@ class SourceCheck {
 
   /// Those that are in the order of those baked again, byte by byte.
   void check_stand_ins(const ModelRecord& model, const ModelRecord& other, double slack) {
-    const StandInChunks ours = stand_in_chunks(model);
-    const StandInChunks theirs = stand_in_chunks_again(other);
+    const StandInChunks ours = stand_in_chunks(bundle_, model);
+    const StandInChunks theirs = stand_in_chunks(again_, other);
     for (std::size_t i = 0; i < std::min(ours.size(), theirs.size()); ++i) {
       const std::string fault =
           level_difference({&bundle_.layouts()[model.layout], ours[i].first, ours[i].second,
                             bundle_.vertices(), bundle_.indices()},
-                           {&again_->layouts[other.layout], theirs[i].first, theirs[i].second,
-                            again_->vertices, again_->indices},
+                           {&again_.layouts()[other.layout], theirs[i].first, theirs[i].second,
+                            again_.vertices(), again_.indices()},
                            slack);
       if (fault.empty()) continue;
       tell(WorkstationRule::kSourceSurface,
@@ -391,31 +390,31 @@ class SourceCheck {
 
   /// Cuts what is seen through as the bake does.
   void cut_as_baked(const ModelRecord& model, TriMesh& mesh) const {
-    const ModelRecord* other = namesake(again_->models, model.name);
+    const ModelRecord* other = namesake(again_.models(), model.name);
     if (other == nullptr || other->material_count != mesh.materials.size()) return;
     std::vector<bool> seen_through;
     for (std::uint32_t m = 0; m < other->material_count; ++m) {
-      seen_through.push_back(blended(again_->materials[other->first_material + m], *again_));
+      seen_through.push_back(blended_[other->first_material + m]);
     }
     cut_crossing(mesh, seen_through);
   }
 
   /// Levels that are in the order of those baked again, byte by byte: what was changed since.
   void check_levels(const ModelRecord& model) {
-    const ModelRecord* other = namesake(again_->models, model.name);
+    const ModelRecord* other = namesake(again_.models(), model.name);
     if (other == nullptr || other->chunk_count != model.chunk_count) return;
     const double slack = 2 * model.position_error_max / model.scale + 1e-6;
     bool same = true;
     for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
       const ChunkRecord& a = bundle_.chunks()[model.first_chunk + c];
-      const ChunkRecord& b = again_->chunks[other->first_chunk + c];
+      const ChunkRecord& b = again_.chunks()[other->first_chunk + c];
       for (std::uint32_t l = 0; l < std::min(a.level_count, b.level_count); ++l) {
         const LevelPart ours{&bundle_.layouts()[model.layout], &a,
                              &bundle_.levels()[a.first_level + l], bundle_.vertices(),
                              bundle_.indices()};
-        const LevelPart theirs{&again_->layouts[other->layout], &b,
-                               &again_->levels[b.first_level + l], again_->vertices,
-                               again_->indices};
+        const LevelPart theirs{&again_.layouts()[other->layout], &b,
+                               &again_.levels()[b.first_level + l], again_.vertices(),
+                               again_.indices()};
         const std::string fault = level_difference(ours, theirs, slack);
         same = same && same_level(*ours.level, *theirs.level, ours.layout->stride);
         if (fault.empty()) continue;
@@ -453,7 +452,7 @@ class SourceCheck {
   void check_parameter_sets() {
     for (std::uint32_t i = 0; i < bundle_.parameter_sets().size(); ++i) {
       const ParameterSetRecord& set = bundle_.parameter_sets()[i];
-      const ParameterSetRecord* other = namesake(again_->parameter_sets, set.name);
+      const ParameterSetRecord* other = namesake(again_.parameter_sets(), set.name);
       constexpr std::size_t kSize =
           offsetof(ParameterSetRecord, reserved) - offsetof(ParameterSetRecord, id);
       if (other == nullptr || std::memcmp(&set.id, &other->id, kSize) == 0) continue;
@@ -464,13 +463,10 @@ class SourceCheck {
 
   /// The shades of a model's corners, where it has the same vertices.
   void check_occlusion(const ModelRecord& model) {
-    const ModelRecord* other = namesake(again_->models, model.name);
+    const ModelRecord* other = namesake(again_.models(), model.name);
     if (other == nullptr || other->chunk_count != model.chunk_count) return;
     const std::uint32_t ours = occlusion_byte(bundle_.occlusion(), model.layout);
-    std::uint32_t theirs = kNone;
-    for (const OcclusionRecord& record : again_->occlusion) {
-      if (record.layout == other->layout) theirs = record.offset;
-    }
+    const std::uint32_t theirs = occlusion_byte(again_.occlusion(), other->layout);
     const std::string where = label("model", model.name);
     if ((ours == kNone) != (theirs == kNone)) {
       return tell(WorkstationRule::kSourceColour, where, &model,
@@ -478,18 +474,18 @@ class SourceCheck {
     }
     if (ours == kNone) return;
     const std::size_t stride = bundle_.layouts()[model.layout].stride;
-    const std::size_t other_stride = again_->layouts[other->layout].stride;
+    const std::size_t other_stride = again_.layouts()[other->layout].stride;
     double sum = 0;
     std::size_t count = 0;
     for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
       const LevelRecord& a = bundle_.levels()[bundle_.chunks()[model.first_chunk + c].first_level];
-      const LevelRecord& b = again_->levels[again_->chunks[other->first_chunk + c].first_level];
+      const LevelRecord& b = again_.levels()[again_.chunks()[other->first_chunk + c].first_level];
       if (a.vertex_count != b.vertex_count) return;
       for (std::size_t v = 0; v < a.vertex_count; ++v) {
         const auto mine =
             std::to_integer<int>(bundle_.vertices()[a.vertex_offset + v * stride + ours]);
         const auto its =
-            std::to_integer<int>(again_->vertices[b.vertex_offset + v * other_stride + theirs]);
+            std::to_integer<int>(again_.vertices()[b.vertex_offset + v * other_stride + theirs]);
         sum += std::abs(mine - its);
       }
       count += a.vertex_count;
@@ -500,22 +496,13 @@ class SourceCheck {
          "its occlusion is off by " + std::to_string(mean) + " of 127 on average");
   }
 
-  [[nodiscard]] std::span<const std::byte> section_again(SectionType type,
-                                                         std::size_t owner) const {
-    for (const ExtraSection& extra : again_->extra) {
-      if (extra.type == static_cast<std::uint32_t>(type) && extra.owner == owner)
-        return extra.bytes;
-    }
-    return {};
-  }
-
   /// Of a model that has the same bytes.
   void check_draw_order(const ModelRecord& model) {
-    const ModelRecord* other = namesake(again_->models, model.name);
+    const ModelRecord* other = namesake(again_.models(), model.name);
     for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
       const std::uint32_t chunk = model.first_chunk + c;
       if (equal(bundle_.section(SectionType::kDrawOrder, chunk),
-                section_again(SectionType::kDrawOrder, other->first_chunk + c))) {
+                again_.section(SectionType::kDrawOrder, other->first_chunk + c))) {
         continue;
       }
       tell(WorkstationRule::kSourceColour,
@@ -561,41 +548,40 @@ class SourceCheck {
     }
   }
 
-  [[nodiscard]] std::string_view texture_of(const MaterialRecord& material) const {
+  static std::string_view texture_of(const BundleView& bundle, const MaterialRecord& material) {
     if (material.texture == kNone) return "none";
-    return bundle_.name(bundle_.textures()[material.texture].name);
+    return bundle.name(bundle.textures()[material.texture].name);
   }
 
-  [[nodiscard]] std::string_view texture_again(const MaterialRecord& material) const {
-    if (material.texture == kNone) return "none";
-    return name_again(again_->textures[material.texture].name);
+  /// Of each of a model's materials.
+  static std::vector<std::uint64_t> triangle_counts(const BundleView& bundle,
+                                                    const ModelRecord& model) {
+    std::vector<std::uint64_t> counts(model.material_count, 0);
+    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
+      counts[chunk.material - model.first_material] +=
+          bundle.levels()[chunk.first_level].index_count / 3;
+    }
+    return counts;
   }
 
   /// Materials by their order: names, colours, textures, and how many triangles each has.
   void check_materials(const ModelRecord& model) {
-    const ModelRecord* other = namesake(again_->models, model.name);
+    const ModelRecord* other = namesake(again_.models(), model.name);
     if (other == nullptr) return;
     const auto count = std::min(model.material_count, other->material_count);
-    std::vector<std::uint64_t> ours(count, 0);
-    std::vector<std::uint64_t> theirs(count, 0);
-    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-      const ChunkRecord& chunk = bundle_.chunks()[model.first_chunk + c];
-      const std::uint32_t m = chunk.material - model.first_material;
-      if (m < count) ours[m] += bundle_.levels()[chunk.first_level].index_count / 3;
-    }
-    for (std::uint32_t c = 0; c < other->chunk_count; ++c) {
-      const ChunkRecord& chunk = again_->chunks[other->first_chunk + c];
-      const std::uint32_t m = chunk.material - other->first_material;
-      if (m < count) theirs[m] += again_->levels[chunk.first_level].index_count / 3;
-    }
+    const std::vector<std::uint64_t> ours = triangle_counts(bundle_, model);
+    const std::vector<std::uint64_t> theirs = triangle_counts(again_, *other);
     for (std::uint32_t m = 0; m < count; ++m) {
       const MaterialRecord& a = bundle_.materials()[model.first_material + m];
-      const MaterialRecord& b = again_->materials[other->first_material + m];
+      const MaterialRecord& b = again_.materials()[other->first_material + m];
       const std::string where = label("model", model.name) + ", " + label("material", a.name);
-      if (texture_of(a) != texture_again(b)) {
+      const std::string_view our_texture = texture_of(bundle_, a);
+      const std::string_view their_texture = texture_of(again_, b);
+      if (our_texture != their_texture) {
         tell(WorkstationRule::kSourceColour, where, &a.texture,
-             "its texture is '" + std::string(texture_of(a)) + "', the source's is '" +
-                 std::string(texture_again(b)) + "'");
+             "its texture is '" + std::string(our_texture) + "', the source's is '" +
+                 std::string(their_texture) + "'");
       }
       if (std::memcmp(a.ambient, b.ambient,
                       offsetof(MaterialRecord, texture) - offsetof(MaterialRecord, ambient)) != 0 ||
@@ -612,29 +598,32 @@ class SourceCheck {
 
   /// Scenes of assets whose sources are given, as the bundle states that they were asked for.
   void check_scenes() {
-    if (bundle_.scenes().size() < again_->scenes.size()) {
+    if (bundle_.scenes().size() < again_.scenes().size()) {
       tell(WorkstationRule::kSourceScene, "scenes", bundle_.bytes().data(),
            "it has " + std::to_string(bundle_.scenes().size()) + ", and was baked with " +
-               std::to_string(again_->scenes.size()));
+               std::to_string(again_.scenes().size()));
     }
     for (std::uint32_t s = 0; s < bundle_.scenes().size(); ++s) {
       const SceneRecord& scene = bundle_.scenes()[s];
       const PatternRecord& pattern = bundle_.patterns()[scene.pattern];
       const ModelRecord& model = bundle_.models()[scene.model];
-      if (namesake(again_->patterns, pattern.name) == nullptr ||
-          namesake(again_->models, model.name) == nullptr) {
+      if (namesake(again_.patterns(), pattern.name) == nullptr ||
+          namesake(again_.models(), model.name) == nullptr) {
         continue;
       }
       const std::string where =
           "scene " + std::to_string(s) + ", " + label("pattern", pattern.name);
-      const auto found =
-          std::find_if(again_->scenes.begin(), again_->scenes.end(), [&](const SceneRecord& other) {
-            return name_again(again_->patterns[other.pattern].name) == bundle_.name(pattern.name) &&
-                   name_again(again_->models[other.model].name) == bundle_.name(model.name) &&
-                   same_place(scene, other);
-          });
-      if (found != again_->scenes.end()) {
-        check_lighting(s, static_cast<std::uint32_t>(found - again_->scenes.begin()), where);
+      std::uint32_t other = 0;
+      for (; other < again_.scenes().size(); ++other) {
+        const SceneRecord& its = again_.scenes()[other];
+        if (again_.name(again_.patterns()[its.pattern].name) == bundle_.name(pattern.name) &&
+            again_.name(again_.models()[its.model].name) == bundle_.name(model.name) &&
+            same_place(scene, its)) {
+          break;
+        }
+      }
+      if (other < again_.scenes().size()) {
+        check_lighting(s, other, where);
         continue;
       }
       tell(WorkstationRule::kSourceScene, where, &scene,
@@ -643,17 +632,18 @@ class SourceCheck {
     }
   }
 
+  static const LightRecord* light_of(const BundleView& bundle, std::uint32_t scene) {
+    const Table<LightRecord> lights = bundle.lights();
+    for (std::uint32_t i = 0; i < lights.size(); ++i) {
+      if (lights[i].scene == scene) return &lights[i];
+    }
+    return nullptr;
+  }
+
   /// The light and the shadow of a scene whose model stands as in the source's.
   void check_lighting(std::uint32_t scene, std::uint32_t other, const std::string& where) {
-    const auto light_of = [](const auto& lights, std::uint32_t index) {
-      const LightRecord* found = nullptr;
-      for (std::uint32_t i = 0; i < lights.size(); ++i) {
-        if (lights[i].scene == index) found = &lights[i];
-      }
-      return found;
-    };
-    const LightRecord* ours = light_of(bundle_.lights(), scene);
-    const LightRecord* theirs = light_of(again_->lights, other);
+    const LightRecord* ours = light_of(bundle_, scene);
+    const LightRecord* theirs = light_of(again_, other);
     const SceneRecord* place = &bundle_.scenes()[scene];
     if (ours != nullptr && theirs == nullptr) {  // its picture is not among the sources
       return tell(WorkstationRule::kSourceMissing, where + ", light", ours, "");
@@ -664,9 +654,8 @@ class SourceCheck {
     if (ours != nullptr && !same_light(*ours, *theirs)) {
       tell(WorkstationRule::kSourceScene, where, ours, "its light is not that of its picture");
     }
-    const auto shadow = bundle_.section(SectionType::kShadow, scene);
-    const std::string fault = shadow_fault(
-        shadow, other < again_->shadows.size() ? again_->shadows[other] : std::vector<std::byte>());
+    const std::string fault = shadow_fault(bundle_.section(SectionType::kShadow, scene),
+                                           again_.section(SectionType::kShadow, other));
     if (!fault.empty()) tell(WorkstationRule::kSourceScene, where, place, fault);
   }
 
@@ -728,35 +717,36 @@ class SourceCheck {
     if (!same) tell(WorkstationRule::kSourceBytes, where, place, "");
   }
 
+  /// A texture's greatest level.
+  static RgbaImage picture_of(const BundleView& bundle, std::uint32_t index) {
+    const TextureRecord& texture = bundle.textures()[index];
+    const TextureLevelRecord& level = bundle.texture_levels()[texture.first_level];
+    return decode_texture(static_cast<TextureFormat>(texture.format),
+                          part(bundle.texture_data(index), level.offset, level.size), texture.width,
+                          texture.height);
+  }
+
   void check_texture(std::uint32_t index) {
     const TextureRecord& texture = bundle_.textures()[index];
     const std::string where = label("texture", texture.name);
-    const TextureRecord* other = namesake(again_->textures, texture.name);
-    if (other == nullptr) return missing("texture", texture.name, &texture);
-    const auto& data =
-        again_->texture_data[static_cast<std::size_t>(other - again_->textures.data())];
-    const bool same = equal(bundle_.texture_data(index), data);
+    const std::uint32_t which = number_of_namesake(again_.textures(), texture.name);
+    if (which == kNone) return missing("texture", texture.name, &texture);
+    const TextureRecord& other = again_.textures()[which];
+    const bool same = equal(bundle_.texture_data(index), again_.texture_data(which));
     note(same, where, &texture);
-    if (same) return check_texture_levels(texture, *other, where);
-    const auto picture = [](const TextureRecord& t, const TextureLevelRecord& level,
-                            std::span<const std::byte> bytes) {
-      return decode_texture(static_cast<TextureFormat>(t.format),
-                            part(bytes, level.offset, level.size), t.width, t.height);
-    };
-    const RgbaImage ours = picture(texture, bundle_.texture_levels()[texture.first_level],
-                                   bundle_.texture_data(index));
-    const RgbaImage theirs = picture(*other, again_->texture_levels[other->first_level], data);
+    if (same) return check_texture_levels(texture, other, where);
+    const RgbaImage ours = picture_of(bundle_, index);
+    const RgbaImage theirs = picture_of(again_, which);
     const bool size = ours.width == theirs.width && ours.height == theirs.height;
     const double psnr = size ? psnr_db(ours, theirs) : 0.0;
     // Textures that look alike may have changed places.
-    for (std::size_t t = 0; t < again_->textures.size(); ++t) {
-      const TextureRecord& third = again_->textures[t];
-      if (&third == other || third.width != ours.width || third.height != ours.height) continue;
-      const RgbaImage rival =
-          picture(third, again_->texture_levels[third.first_level], again_->texture_data[t]);
+    for (std::uint32_t t = 0; t < again_.textures().size(); ++t) {
+      const TextureRecord& third = again_.textures()[t];
+      if (t == which || third.width != ours.width || third.height != ours.height) continue;
+      const RgbaImage rival = picture_of(again_, t);
       if (psnr_db(ours, rival) <= psnr) continue;
       return tell(WorkstationRule::kSourceColour, where, &texture,
-                  "it is nearer to texture '" + std::string(name_again(third.name)) + "'");
+                  "it is nearer to texture '" + std::string(again_.name(third.name)) + "'");
     }
     if (psnr >= kLeastTexturePsnr) {
       const double worst = worst_block(ours, theirs);
@@ -796,7 +786,7 @@ class SourceCheck {
                 texture.level_count == other.level_count;
     for (std::uint32_t i = 0; same && i < texture.level_count; ++i) {
       const TextureLevelRecord& a = bundle_.texture_levels()[texture.first_level + i];
-      const TextureLevelRecord& b = again_->texture_levels[other.first_level + i];
+      const TextureLevelRecord& b = again_.texture_levels()[other.first_level + i];
       same = a.offset == b.offset && a.alpha_offset == b.alpha_offset &&
              near(a.psnr_db, b.psnr_db) && near(a.ssim, b.ssim);
     }
@@ -807,42 +797,35 @@ class SourceCheck {
 
   void check_pattern(std::uint32_t index) {
     const PatternRecord& pattern = bundle_.patterns()[index];
-    const PatternRecord* other = namesake(again_->patterns, pattern.name);
-    if (other == nullptr) {
-      return missing("pattern", pattern.name, &pattern, strange_pattern_);
-    }
-    const auto which = static_cast<std::uint32_t>(other - again_->patterns.data());
-    bool same = pattern.width == other->width && pattern.height == other->height;
-    for (const FeatureContent& features : again_->features[which]) {
-      const FeatureView view = bundle_.features(index, features.set_id);
-      same = same &&
-             equal(std::as_bytes(view.keypoints), std::as_bytes(std::span(features.keypoints))) &&
-             equal(view.descriptors, features.descriptors);
+    const std::uint32_t which = number_of_namesake(again_.patterns(), pattern.name);
+    if (which == kNone) return missing("pattern", pattern.name, &pattern, strange_pattern_);
+    const PatternRecord& other = again_.patterns()[which];
+    bool same = pattern.width == other.width && pattern.height == other.height;
+    for (std::uint32_t s = 0; s < again_.parameter_sets().size(); ++s) {
+      const std::uint32_t set = again_.parameter_sets()[s].id;
+      const auto features = again_.section(SectionType::kMappedFeatures, which, set);
+      same = same && (features.empty() ||
+                      equal(bundle_.section(SectionType::kMappedFeatures, index, set), features));
     }
     const auto record = bundle_.section(SectionType::kTrackerRecord, index);
-    const auto section = std::find_if(
-        again_->extra.begin(), again_->extra.end(), [which](const ExtraSection& extra) {
-          return extra.type == static_cast<std::uint32_t>(SectionType::kTrackerRecord) &&
-                 extra.owner == which;
-        });
-    const bool tracked = !record.empty() && section != again_->extra.end();
-    const bool same_record = !tracked || equal(record, section->bytes);
+    const auto record_again = again_.section(SectionType::kTrackerRecord, which);
+    const bool same_record = record.empty() || record_again.empty() || equal(record, record_again);
     note(same && same_record, label("pattern", pattern.name), &pattern);
-    const std::string fault = same_record ? "" : record_fault(record, section->bytes);
+    const std::string fault = same_record ? "" : record_fault(record, record_again);
     if (!fault.empty()) {
       tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern, fault);
     }
     if (!equal(bundle_.section(SectionType::kPatternShape, index),
-               section_again(SectionType::kPatternShape, which))) {
+               again_.section(SectionType::kPatternShape, which))) {
       tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern,
            "its shape is not the source's");
     }
     if (!same_colours(bundle_.section(SectionType::kPatternColours, index),
-                      section_again(SectionType::kPatternColours, which))) {
+                      again_.section(SectionType::kPatternColours, which))) {
       tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern,
            "its colours, by which light is measured, are not the source's");
     }
-    const double width = other->width_mm;
+    const double width = other.width_mm;
     if (width <= 0 || std::fabs(pattern.width_mm / width - 1) <= kWidthSlack) return;
     tell(WorkstationRule::kSourcePattern, label("pattern", pattern.name), &pattern,
          std::to_string(pattern.width_mm) + " mm wide, the source is " + std::to_string(width));
@@ -933,7 +916,8 @@ class SourceCheck {
 
   const BundleView& bundle_;
   const IssueSink& sink_;
-  const BundleContent* again_ = nullptr;
+  BundleView again_;            ///< baked from the sources
+  std::vector<bool> blended_;   ///< whether its materials are seen through
   bool strange_model_ = false;  ///< a source whose name no model of the bundle has
   bool strange_pattern_ = false;
   SourceFit fit_;
