@@ -42,6 +42,14 @@ class Json {
     return elements;
   }
 
+  /// An array of what `make` makes of each.
+  template <class Range, class Make>
+  static Json list(const Range& range, const Make& make) {
+    Json elements = array();
+    for (const auto& element : range) elements.push_back(make(element));
+    return elements;
+  }
+
   /// To an array.
   void push_back(Json element);
   /// To an object, in place of what the key had.

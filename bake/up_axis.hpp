@@ -46,23 +46,14 @@ struct Upright {
 
 /// For messages: "the geometry: a flat base".
 constexpr std::string_view up_reason_words(UpReason reason) {
-  switch (reason) {
-    case UpReason::kAsked:
-      return "as asked";
-    case UpReason::kStandard:
-      return "the glTF standard";
-    case UpReason::kHeader:
-      return "the file's header";
-    case UpReason::kGeoreferenced:
-      return "map coordinates";
-    case UpReason::kGround:
-      return "geometry: open ground";
-    case UpReason::kBase:
-      return "geometry: a base to stand on";
-    case UpReason::kConvention:
-      break;
-  }
-  return "the convention of its format";
+  constexpr std::string_view kWords[] = {"as asked",
+                                         "the glTF standard",
+                                         "the file's header",
+                                         "map coordinates",
+                                         "geometry: open ground",
+                                         "geometry: a base to stand on",
+                                         "the convention of its format"};
+  return kWords[static_cast<std::size_t>(reason)];
 }
 
 }  // namespace modar

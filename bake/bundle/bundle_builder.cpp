@@ -52,9 +52,8 @@ std::uint32_t layout_index(const LayoutRecord& layout, BundleContent& content) {
 /// Models of one layout are baked alike: all of them have occlusion, or none.
 void add_occlusion(std::uint32_t layout, std::uint32_t byte, BundleContent& content) {
   if (byte == kNone) return;
-  const auto place =
-      std::find_if(content.occlusion.begin(), content.occlusion.end(),
-                   [&](const OcclusionRecord& other) { return other.layout >= layout; });
+  const auto place = std::ranges::find_if(
+      content.occlusion, [&](const OcclusionRecord& other) { return other.layout >= layout; });
   if (place != content.occlusion.end() && place->layout == layout) return;
   content.occlusion.insert(place, {layout, byte});
 }

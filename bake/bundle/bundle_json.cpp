@@ -414,16 +414,11 @@ std::string scene_words(const BundleView& bundle, std::uint32_t index) {
 }
 
 Json diagnostics_json(const std::vector<Diagnostic>& diagnostics) {
-  Json list = Json::array();
-  for (const Diagnostic& diagnostic : diagnostics) {
-    list.push_back({{"id", diagnostic.id},
-                    {"severity", severity_name(diagnostic.severity)},
-                    {"file", diagnostic.file},
-                    {"line", diagnostic.line},
-                    {"message", diagnostic.message},
-                    {"cure", diagnostic.cure}});
-  }
-  return list;
+  return Json::list(diagnostics, [&](const Diagnostic& diagnostic) -> Json {
+    return {{"id", diagnostic.id},           {"severity", severity_name(diagnostic.severity)},
+            {"file", diagnostic.file},       {"line", diagnostic.line},
+            {"message", diagnostic.message}, {"cure", diagnostic.cure}};
+  });
 }
 
 std::optional<StatedPlacement> stated_placement(const BundleView& bundle, std::uint32_t scene) {
@@ -558,54 +553,37 @@ Json scene_json(const BundleView& bundle, std::uint32_t index) {
           {"actions", actions}};
 }
 
+Json media_json(const BundleView& bundle, std::uint32_t index) {
+  const MediaRecord& record = bundle.media()[index];
+  const bool video = record.kind == static_cast<std::uint32_t>(MediaKind::kVideo);
+  return {{"name", bundle.name(record.name)},
+          {"kind", video ? "video" : "sound"},
+          {"width", record.width},
+          {"height", record.height},
+          {"seconds", record.seconds},
+          {"sound", (record.flags & kMediaSound) != 0},
+          {"flashes", (record.flags & kMediaFlashes) != 0},
+          {"poster", video ? Json(record.poster) : Json()},
+          {"bytes", bundle.media_data(index).size()}};
+}
+
 }  // namespace
 
 Json bundle_json(const BundleView& bundle) {
-  Json models = Json::array();
-  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
-    models.push_back(model_json(bundle, m));
-  }
-  Json textures = Json::array();
-  for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
-    textures.push_back(texture_json(bundle, t));
-  }
-  Json patterns = Json::array();
-  for (std::uint32_t p = 0; p < bundle.patterns().size(); ++p) {
-    patterns.push_back(pattern_json(bundle, p));
-  }
-  Json scenes = Json::array();
-  for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
-    scenes.push_back(scene_json(bundle, s));
-  }
-  Json nodes = Json::array();
-  for (std::uint32_t n = 0; n < bundle.nodes().size(); ++n) nodes.push_back(node_json(bundle, n));
-  Json actions = Json::array();
-  for (std::uint32_t a = 0; a < bundle.actions().size(); ++a) {
-    actions.push_back(action_json(bundle, a));
-  }
-  Json media = Json::array();
-  for (std::uint32_t m = 0; m < bundle.media().size(); ++m) {
-    const MediaRecord& record = bundle.media()[m];
-    const bool video = record.kind == static_cast<std::uint32_t>(MediaKind::kVideo);
-    media.push_back({{"name", bundle.name(record.name)},
-                     {"kind", video ? "video" : "sound"},
-                     {"width", record.width},
-                     {"height", record.height},
-                     {"seconds", record.seconds},
-                     {"sound", (record.flags & kMediaSound) != 0},
-                     {"flashes", (record.flags & kMediaFlashes) != 0},
-                     {"poster", video ? Json(record.poster) : Json()},
-                     {"bytes", bundle.media_data(m).size()}});
-  }
+  const auto list = [&](std::uint32_t count, Json (*one)(const BundleView&, std::uint32_t)) {
+    Json all = Json::array();
+    for (std::uint32_t i = 0; i < count; ++i) all.push_back(one(bundle, i));
+    return all;
+  };
   return {{"format", {{"major", bundle.header().major}, {"minor", bundle.header().minor}}},
           {"bytes", bundle.bytes().size()},
-          {"models", models},
-          {"textures", textures},
-          {"patterns", patterns},
-          {"scenes", scenes},
-          {"nodes", nodes},
-          {"actions", actions},
-          {"media", media}};
+          {"models", list(bundle.models().size(), model_json)},
+          {"textures", list(bundle.textures().size(), texture_json)},
+          {"patterns", list(bundle.patterns().size(), pattern_json)},
+          {"scenes", list(bundle.scenes().size(), scene_json)},
+          {"nodes", list(bundle.nodes().size(), node_json)},
+          {"actions", list(bundle.actions().size(), action_json)},
+          {"media", list(bundle.media().size(), media_json)}};
 }
 
 }  // namespace modar

@@ -58,8 +58,7 @@ class Linker {
       MODAR_ASSIGN(scene, resolve_scene(scene, content_, pattern, model));
       content_.scenes.push_back(place_scene(scene, content_, pattern, model));
     }
-    std::sort(content_.occlusion.begin(), content_.occlusion.end(),
-              [](const auto& a, const auto& b) { return a.layout < b.layout; });
+    std::ranges::sort(content_.occlusion, {}, &OcclusionRecord::layout);
     Report quiet;
     MODAR_TRY(add_nodes(resolved, content_, quiet, media));
     MODAR_TRY(light_scenes(resolved.scenes, resolved, content_, quiet));
@@ -75,8 +74,7 @@ class Linker {
  private:
   static Result<std::uint32_t> find(std::span<const LinkPart> parts, const std::string& name,
                                     const std::string& what) {
-    const auto found = std::find_if(parts.begin(), parts.end(),
-                                    [&](const LinkPart& part) { return part.name == name; });
+    const auto found = std::ranges::find(parts, name, &LinkPart::name);
     if (found != parts.end()) return static_cast<std::uint32_t>(found - parts.begin());
     return fail(ExitCode::kUsage, "bake.scene-unknown", name,
                 "the scene names a " + what + " that is not baked", "name one that is");
@@ -87,16 +85,15 @@ class Linker {
     std::vector<std::uint32_t> indices;
     for (std::uint32_t t = 0; t < part.textures().size(); ++t) {
       const std::span<const std::byte> data = part.texture_data(t);
-      const auto same = std::find_if(
-          content_.textures.begin(), content_.textures.end(), [&](const TextureRecord& other) {
-            const auto& bytes =
-                content_.texture_data[static_cast<std::size_t>(&other - content_.textures.data())];
-            const TextureRecord& mine = part.textures()[t];
-            return other.width == mine.width && other.height == mine.height &&
-                   other.format == mine.format && other.flags == mine.flags &&
-                   other.level_count == mine.level_count &&
-                   std::equal(bytes.begin(), bytes.end(), data.begin(), data.end());
-          });
+      const auto same = std::ranges::find_if(content_.textures, [&](const TextureRecord& other) {
+        const auto& bytes =
+            content_.texture_data[static_cast<std::size_t>(&other - content_.textures.data())];
+        const TextureRecord& mine = part.textures()[t];
+        return other.width == mine.width && other.height == mine.height &&
+               other.format == mine.format && other.flags == mine.flags &&
+               other.level_count == mine.level_count &&
+               std::equal(bytes.begin(), bytes.end(), data.begin(), data.end());
+      });
       indices.push_back(static_cast<std::uint32_t>(same - content_.textures.begin()));
       if (same == content_.textures.end()) add_texture(part, t);
     }

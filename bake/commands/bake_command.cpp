@@ -143,14 +143,13 @@ void report_memory(const BakeRequest& request, Report& report) {
 }
 
 Json bake_json(const BundleView& bundle, const Report& report) {
-  Json stages = Json::array();
-  for (const StageReport& stage : report.stages) {
-    stages.push_back({{"name", stage.name},
-                      {"ms", stage.ms},
-                      {"in", stage.in},
-                      {"out", stage.out},
-                      {"max_error", stage.max_error}});
-  }
+  const Json stages = Json::list(report.stages, [&](const StageReport& stage) -> Json {
+    return {{"name", stage.name},
+            {"ms", stage.ms},
+            {"in", stage.in},
+            {"out", stage.out},
+            {"max_error", stage.max_error}};
+  });
   Json half_edges = Json::array();
   for (const MeshTopology& topology : report.topologies) {
     if (!topology.half_edges) continue;

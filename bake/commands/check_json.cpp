@@ -32,15 +32,14 @@ std::string uri_of(const std::string& path) {
 }
 
 Json source_json(const SourceFit& fit) {
-  Json models = Json::array();
-  for (const ModelFit& model : fit.models) {
-    models.push_back({{"name", model.name},
-                      {"same_bytes", model.same_bytes},
-                      {"stated_error", model.stated_error},
-                      {"source_to_bundle", model.source_to_bundle},
-                      {"bundle_to_source", model.bundle_to_source},
-                      {"colour_error", model.colour_error}});
-  }
+  const Json models = Json::list(fit.models, [&](const ModelFit& model) -> Json {
+    return {{"name", model.name},
+            {"same_bytes", model.same_bytes},
+            {"stated_error", model.stated_error},
+            {"source_to_bundle", model.source_to_bundle},
+            {"bundle_to_source", model.bundle_to_source},
+            {"colour_error", model.colour_error}};
+  });
   return {
       {"models", models}, {"same", Json::list(fit.same)}, {"different", Json::list(fit.different)}};
 }
@@ -48,16 +47,15 @@ Json source_json(const SourceFit& fit) {
 Json poses_json(const std::vector<PatternRange>& ranges) {
   Json list = Json::array();
   for (const PatternRange& range : ranges) {
-    Json steps = Json::array();
-    for (const PoseStep& step : range.steps) {
-      steps.push_back({{"area", step.area},
-                       {"tilt_deg", step.tilt_deg},
-                       {"views", step.views},
-                       {"right", step.right},
-                       {"corner_px", step.corner_px},
-                       {"rotation_deg", step.rotation_deg},
-                       {"translation_percent", step.translation_percent}});
-    }
+    const Json steps = Json::list(range.steps, [&](const PoseStep& step) -> Json {
+      return {{"area", step.area},
+              {"tilt_deg", step.tilt_deg},
+              {"views", step.views},
+              {"right", step.right},
+              {"corner_px", step.corner_px},
+              {"rotation_deg", step.rotation_deg},
+              {"translation_percent", step.translation_percent}};
+    });
     list.push_back({{"pattern", range.name},
                     {"method", range.method},
                     {"area_low", range.area_low},
@@ -72,31 +70,27 @@ Json poses_json(const std::vector<PatternRange>& ranges) {
 }
 
 Json levels_json(const std::vector<LevelLook>& levels) {
-  Json list = Json::array();
-  for (const LevelLook& level : levels) {
-    list.push_back({{"level", level.level},
-                    {"side_px", level.side_px},
-                    {"triangles", level.triangles},
-                    {"finest_triangles", level.finest_triangles},
-                    {"difference_p99", level.difference}});
-  }
-  return list;
+  return Json::list(levels, [&](const LevelLook& level) -> Json {
+    return {{"level", level.level},
+            {"side_px", level.side_px},
+            {"triangles", level.triangles},
+            {"finest_triangles", level.finest_triangles},
+            {"difference_p99", level.difference}};
+  });
 }
 
 Json looks_json(const std::vector<ModelLook>& looks) {
-  Json list = Json::array();
-  for (const ModelLook& look : looks) {
-    list.push_back({{"model", look.name},
-                    {"judged", look.judged},
-                    {"ssim_mean", look.ssim_mean},
-                    {"ssim_worst", look.ssim_worst},
-                    {"delta_e_mean", look.delta_e_mean},
-                    {"delta_e_worst", look.delta_e_worst},
-                    {"worst_view", look.worst_view},
-                    {"picture", look.picture.empty() ? Json() : Json(look.picture)},
-                    {"levels", levels_json(look.levels)}});
-  }
-  return list;
+  return Json::list(looks, [&](const ModelLook& look) -> Json {
+    return {{"model", look.name},
+            {"judged", look.judged},
+            {"ssim_mean", look.ssim_mean},
+            {"ssim_worst", look.ssim_worst},
+            {"delta_e_mean", look.delta_e_mean},
+            {"delta_e_worst", look.delta_e_worst},
+            {"worst_view", look.worst_view},
+            {"picture", look.picture.empty() ? Json() : Json(look.picture)},
+            {"levels", levels_json(look.levels)}};
+  });
 }
 
 const char* sarif_level(Severity severity) {
@@ -104,14 +98,12 @@ const char* sarif_level(Severity severity) {
 }
 
 Json sarif_rules(const std::vector<const IssueKind*>& kinds) {
-  Json rules = Json::array();
-  for (const IssueKind* kind : kinds) {
-    rules.push_back({{"id", kind->id},
-                     {"shortDescription", {{"text", kind->message}}},
-                     {"help", {{"text", kind->cure}}},
-                     {"defaultConfiguration", {{"level", sarif_level(kind->severity)}}}});
-  }
-  return rules;
+  return Json::list(kinds, [&](const IssueKind* kind) -> Json {
+    return {{"id", kind->id},
+            {"shortDescription", {{"text", kind->message}}},
+            {"help", {{"text", kind->cure}}},
+            {"defaultConfiguration", {{"level", sarif_level(kind->severity)}}}};
+  });
 }
 
 Json sarif_result(const WeighedIssue& weighed, const std::string& uri, std::size_t rule) {

@@ -80,9 +80,9 @@ std::string corners_text(const std::array<PixelPoint, 4>& corners) {
 }
 
 Json corners_json(const std::array<PixelPoint, 4>& corners) {
-  Json json = Json::array();
-  for (const PixelPoint& corner : corners) json.push_back(Json::array({corner.x, corner.y}));
-  return json;
+  return Json::list(corners, [&](const PixelPoint& corner) {
+    return Json::array({corner.x, corner.y});
+  });
 }
 
 /// The corners of --corners, or those that are found, shown in a picture.
@@ -209,10 +209,9 @@ Json failure_json(const std::string& path, const Error& error) {
 }
 
 Json score_json(const NamedScore& one) {
-  Json causes = Json::array();
-  for (const ScoreCause& cause : one.score.causes) {
-    causes.push_back({{"id", cause.id}, {"value", cause.value}, {"advice", cause.advice}});
-  }
+  const Json causes = Json::list(one.score.causes, [&](const ScoreCause& cause) -> Json {
+    return {{"id", cause.id}, {"value", cause.value}, {"advice", cause.advice}};
+  });
   return {{"name", one.name},
           {"score", one.score.score},
           {"version", kScoreVersion},
@@ -312,8 +311,7 @@ Json value_json(const SimulatedValue& value) {
 Json simulation_json(const Simulation& simulation) {
   Json bands = Json::array();
   for (const SimulatedBand& band : simulation.bands) {
-    Json values = Json::array();
-    for (const SimulatedValue& value : band.values) values.push_back(value_json(value));
+    const Json values = Json::list(band.values, value_json);
     bands.push_back({{"name", band.name}, {"unit", band.unit}, {"values", values}});
   }
   const double width = simulation.width_mm;
@@ -448,12 +446,11 @@ Json confusion_json(const Confusion& confusion) {
                         {"mirrored", confusion.mirrored[shown]},
                         {"in_photos", confusion.in_photos[shown]}});
   }
-  Json keep_apart = Json::array();
-  for (const AlikePair& pair : confusion.alike_pairs()) {
-    keep_apart.push_back(Json{{"a", confusion.names[pair.a]},
-                              {"b", confusion.names[pair.b]},
-                              {"told_apart", pair.told_apart}});
-  }
+  const Json keep_apart = Json::list(confusion.alike_pairs(), [&](const AlikePair& pair) {
+    return Json{{"a", confusion.names[pair.a]},
+                {"b", confusion.names[pair.b]},
+                {"told_apart", pair.told_apart}};
+  });
   return {{"views", confusion.views},
           {"photo_views", confusion.photo_views},
           {"false_recognitions", confusion.false_recognitions()},

@@ -64,19 +64,8 @@ Result<void> refuse_other_options(const std::vector<std::string>& words) {
 }
 
 const char* state_name(State state) {
-  switch (state) {
-    case State::kFresh:
-      return "fresh";
-    case State::kCached:
-      return "cached";
-    case State::kBaked:
-      return "baked";
-    case State::kFailed:
-      return "failed";
-    case State::kStale:
-      break;
-  }
-  return "stale";
+  constexpr const char* kNames[] = {"fresh", "cached", "baked", "failed", "stale"};
+  return kNames[static_cast<std::size_t>(state)];
 }
 
 /// A path in a makefile: blanks, "#" and "$" would end or change it.
@@ -110,25 +99,19 @@ Result<void> keep_no_depfile(const std::string& path) {
 }
 
 Json project_json(const ProjectOutcome& outcome) {
-  Json assets = Json::array();
-  for (const AssetOutcome& asset : outcome.assets) {
-    assets.push_back({{"name", asset.name},
-                      {"tier", asset.tier},
-                      {"state", state_name(asset.state)},
-                      {"reason", asset.reason}});
-  }
-  Json bundles = Json::array();
-  for (const BundleOutcome& bundle : outcome.bundles) {
-    bundles.push_back(
-        {{"path", bundle.path}, {"bytes", bundle.bytes}, {"written", bundle.written}});
-  }
-  Json errors = Json::array();
-  for (const Error& error : outcome.errors) {
-    errors.push_back({{"code", error.code},
-                      {"where", error.where},
-                      {"cause", error.cause},
-                      {"cure", error.cure}});
-  }
+  const Json assets = Json::list(outcome.assets, [&](const AssetOutcome& asset) -> Json {
+    return {{"name", asset.name},
+            {"tier", asset.tier},
+            {"state", state_name(asset.state)},
+            {"reason", asset.reason}};
+  });
+  const Json bundles = Json::list(outcome.bundles, [&](const BundleOutcome& bundle) -> Json {
+    return {{"path", bundle.path}, {"bytes", bundle.bytes}, {"written", bundle.written}};
+  });
+  const Json errors = Json::list(outcome.errors, [&](const Error& error) -> Json {
+    return {
+        {"code", error.code}, {"where", error.where}, {"cause", error.cause}, {"cure", error.cure}};
+  });
   const ProcessCost cost = process_cost();
   return {{"assets", assets},
           {"bundles", bundles},

@@ -5,42 +5,23 @@
 namespace modar {
 namespace {
 
-const char* form_name(PieceForm form) {
-  switch (form) {
-    case PieceForm::kStored:
-      return "stored";
-    case PieceForm::kZstd:
-      return "zstd";
-    case PieceForm::kZstdHalves:
-      return "zstd-etc1";
-    case PieceForm::kMesh:
-      return "mesh";
-    case PieceForm::kFeatureText:
-      return "derived-text";
-    case PieceForm::kLevel:
-      return "level";
-    case PieceForm::kTrackerRecord:
-      return "tracker-record";
-    case PieceForm::kCoded:
-      return "coded";
-  }
-  return "";
-}
+/// Of PieceForm, whose first is 1.
+constexpr const char* kFormNames[] = {"stored",       "zstd",  "zstd-etc1",      "mesh",
+                                      "derived-text", "level", "tracker-record", "coded"};
 
 }  // namespace
 
 std::string publish_json(const PublishReport& report) {
   Json forms = Json::array();
   for (const auto& [form, totals] : report.forms) {
-    forms.push_back({{"form", form_name(form)},
+    forms.push_back({{"form", kFormNames[static_cast<std::size_t>(form) - 1]},
                      {"pieces", totals.pieces},
                      {"raw_bytes", totals.raw_bytes},
                      {"stored_bytes", totals.stored_bytes}});
   }
-  Json changes = Json::array();
-  for (const BundleChange& change : report.changes) {
-    changes.push_back({{"change", to_string(change.kind)}, {"name", change.name}});
-  }
+  const Json changes = Json::list(report.changes, [&](const BundleChange& change) -> Json {
+    return {{"change", to_string(change.kind)}, {"name", change.name}};
+  });
   const Json json = {{"release", Json::parse(release_text(report.release))},
                      {"added_bytes", report.added_bytes},
                      {"changes", changes},
@@ -49,12 +30,11 @@ std::string publish_json(const PublishReport& report) {
 }
 
 std::string list_json(const std::vector<ListedRelease>& releases) {
-  Json list = Json::array();
-  for (const ListedRelease& listed : releases) {
-    list.push_back({{"release", Json::parse(release_text(listed.release))},
-                    {"published", time_text(listed.published)},
-                    {"current", listed.current}});
-  }
+  const Json list = Json::list(releases, [&](const ListedRelease& listed) -> Json {
+    return {{"release", Json::parse(release_text(listed.release))},
+            {"published", time_text(listed.published)},
+            {"current", listed.current}};
+  });
   return Json({{"releases", list}}).dump();
 }
 
@@ -63,10 +43,9 @@ std::string prune_json(std::uint64_t freed_bytes, const std::vector<std::uint64_
 }
 
 std::string verify_json(const VerifyReport& report) {
-  Json damaged = Json::array();
-  for (const DamagedObject& object : report.damaged) {
-    damaged.push_back({{"path", object.path}, {"bundle", object.bundle}, {"cause", object.cause}});
-  }
+  const Json damaged = Json::list(report.damaged, [&](const DamagedObject& object) -> Json {
+    return {{"path", object.path}, {"bundle", object.bundle}, {"cause", object.cause}};
+  });
   return Json({{"version", report.release.version},
                {"epoch", report.release.epoch},
                {"expires", time_text(report.release.expires)},

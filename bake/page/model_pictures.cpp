@@ -270,8 +270,7 @@ std::string wireframe_svg(const BundleView& bundle, std::uint32_t model_index, s
   for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
     add_chunk(bundle, model, c, level, focal, model_view(rotation), triangles);
   }
-  std::sort(triangles.begin(), triangles.end(),
-            [](const DrawnTriangle& a, const DrawnTriangle& b) { return a.depth < b.depth; });
+  std::ranges::sort(triangles, {}, &DrawnTriangle::depth);
   // Behind 20 times as many, nobody sees single triangles: the nearest stand for all.
   if (triangles.size() > 20 * most) {
     triangles.erase(triangles.begin(), triangles.end() - static_cast<std::ptrdiff_t>(20 * most));

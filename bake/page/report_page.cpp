@@ -518,8 +518,7 @@ class Page {
       add(name(bundle_.patterns()[p].name), "pattern", patterns[p]);
     }
     add("tables, names, padding", "rest", rest);
-    std::stable_sort(items.begin(), items.end(),
-                     [](const TreemapItem& a, const TreemapItem& b) { return a.size > b.size; });
+    std::ranges::stable_sort(items, std::greater(), &TreemapItem::size);
     return items;
   }
 

@@ -138,8 +138,7 @@ std::vector<Line> join_segments(std::vector<cv::Vec4f> segments) {
       lines.push_back({(from + to) / 2, along, long_as, {}, 0});
     }
   }
-  std::sort(lines.begin(), lines.end(),
-            [](const Line& a, const Line& b) { return a.length > b.length; });
+  std::ranges::sort(lines, std::greater(), &Line::length);
   if (lines.size() > kMostLines) lines.resize(kMostLines);
   return lines;
 }
@@ -184,9 +183,8 @@ std::array<Point, 4> clockwise(std::array<Point, 4> corners) {
   if (cross(corners[1] - corners[0], corners[2] - corners[1]) < 0) {
     std::swap(corners[1], corners[3]);
   }
-  const auto first =
-      std::min_element(corners.begin(), corners.end(),
-                       [](const Point& a, const Point& b) { return a.x + a.y < b.x + b.y; });
+  const auto first = std::ranges::min_element(
+      corners, [](const Point& a, const Point& b) { return a.x + a.y < b.x + b.y; });
   std::rotate(corners.begin(), first, corners.end());
   return corners;
 }
@@ -234,8 +232,7 @@ class Search {
         }
       }
     }
-    std::sort(found_.begin(), found_.end(),
-              [](const Figure& a, const Figure& b) { return a.score > b.score; });
+    std::ranges::sort(found_, std::greater(), &Figure::score);
     return std::move(found_);
   }
 

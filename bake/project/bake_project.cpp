@@ -407,10 +407,8 @@ class ProjectBake {
                      [&](std::size_t a, std::size_t b) { return sizes[a] > sizes[b]; });
     const double total =
         static_cast<double>(std::accumulate(sizes.begin(), sizes.end(), std::uintmax_t{0}));
-    const auto stale =
-        static_cast<unsigned>(std::count_if(wanted.begin(), wanted.end(), [&](std::size_t i) {
-          return tasks_[i].state == AssetOutcome::State::kStale;
-        }));
+    const auto stale = static_cast<unsigned>(std::ranges::count_if(
+        wanted, [&](std::size_t i) { return tasks_[i].state == AssetOutcome::State::kStale; }));
     const unsigned workers = options_.memory_limited ? 1 : std::clamp(stale, 1U, options_.jobs);
     const unsigned jobs = std::max(1U, options_.jobs / workers);
     const std::string stage =

@@ -91,11 +91,9 @@ bool is_texture(const fs::path& picture, const Found& found) {
     if (is_map_name(stem, model.stem().string())) return true;
     if (!is_own_picture(stem, model.stem().string())) return false;
     const auto source = small_model(fs::path(found.folder) / model);
-    return source &&
-           std::any_of(source->materials.begin(), source->materials.end(),
-                       [&](const SourceMaterial& material) {
-                         return fs::path(material.diffuse_map).filename() == picture.filename();
-                       });
+    return source && std::ranges::any_of(source->materials, [&](const SourceMaterial& material) {
+             return fs::path(material.diffuse_map).filename() == picture.filename();
+           });
   });
 }
 
@@ -205,9 +203,8 @@ std::string tables(const std::string& kind, const std::vector<fs::path>& files,
   std::string text;
   std::set<std::string> taken;
   for (const auto& [glob, group] : groups) {
-    const bool plain = std::all_of(group.begin(), group.end(), [&](const fs::path& file) {
-      return stems[file.stem().string()] == 1;
-    });
+    const bool plain = std::ranges::all_of(
+        group, [&](const fs::path& file) { return stems[file.stem().string()] == 1; });
     if (plain && group.size() > 1) {
       text += "[[" + kind + "]]\nfile = " + glob_without(glob, others) + comment + "\n\n";
       for (const fs::path& file : group) taken.insert(file.stem().string());
@@ -246,12 +243,11 @@ std::optional<Upright> upright_of(const fs::path& path) {
 
 /// "up = "y"   # the glTF standard", so that one sees what to change.
 std::string up_line(const Found& found, const std::string& model) {
-  const auto file =
-      std::find_if(found.models.begin(), found.models.end(), [&](const fs::path& one) {
-        std::string name = one.string();
-        std::replace(name.begin(), name.end(), '/', '-');
-        return one.stem() == model || one.parent_path().filename() == model || name == model;
-      });
+  const auto file = std::ranges::find_if(found.models, [&](const fs::path& one) {
+    std::string name = one.string();
+    std::replace(name.begin(), name.end(), '/', '-');
+    return one.stem() == model || one.parent_path().filename() == model || name == model;
+  });
   const auto up =
       file == found.models.end() ? std::nullopt : upright_of(fs::path(found.folder) / *file);
   if (!up) return "#up = \"y\"\n";

@@ -77,11 +77,10 @@ struct EntryHead {
 };
 
 Json entry_json(const EntryHead& head, const PartNotes& notes) {
-  Json diagnostics = Json::array();
-  for (const Diagnostic& one : notes.diagnostics) {
-    diagnostics.push_back(Json::array(
-        {one.id, static_cast<int>(one.severity), one.file, one.line, one.message, one.cure}));
-  }
+  const Json diagnostics = Json::list(notes.diagnostics, [&](const Diagnostic& one) {
+    return Json::array(
+        {one.id, static_cast<int>(one.severity), one.file, one.line, one.message, one.cure});
+  });
   return {{"key", head.key},
           {"name", head.name},
           {"bundle", head.digest},

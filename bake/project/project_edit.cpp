@@ -183,8 +183,7 @@ class Editor {
 
   [[nodiscard]] static const TomlPair* find_pair(const std::vector<TomlPair>& pairs,
                                                  const Key& key) {
-    const auto found = std::find_if(pairs.begin(), pairs.end(),
-                                    [&](const TomlPair& pair) { return pair.key == key; });
+    const auto found = std::ranges::find(pairs, key, &TomlPair::key);
     return found == pairs.end() ? nullptr : &*found;
   }
 
@@ -308,9 +307,8 @@ class Editor {
 
   [[nodiscard]] static std::size_t index_of(const std::vector<TomlPair>& pairs,
                                             const TomlPair& pair) {
-    const auto found = std::find_if(pairs.begin(), pairs.end(), [&](const TomlPair& one) {
-      return one.whole.begin == pair.whole.begin;
-    });
+    const auto found = std::ranges::find_if(
+        pairs, [&](const TomlPair& one) { return one.whole.begin == pair.whole.begin; });
     return static_cast<std::size_t>(found - pairs.begin());
   }
 

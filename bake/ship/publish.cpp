@@ -110,9 +110,8 @@ Result<void> check_bundles(const PublishRequest& request) {
 /// Will there be the bundles whose devices the request names? Errors: kUsage "ship.for".
 Result<void> check_devices(const PublishRequest& request, const std::vector<ReleaseBundle>& kept) {
   for (const auto& [name, devices] : request.devices) {
-    const bool published =
-        std::any_of(request.bundles.begin(), request.bundles.end(),
-                    [&](const std::string& path) { return name_of(path) == name; });
+    const bool published = std::ranges::any_of(
+        request.bundles, [&](const std::string& path) { return name_of(path) == name; });
     if (!published && find_bundle(kept, name) == nullptr) {
       return fail(ExitCode::kUsage, "ship.for", name, "the release has no such bundle",
                   "name one that it has");
@@ -137,8 +136,7 @@ std::vector<BundleChange> changes_between(const std::vector<ReleaseBundle>& befo
       changes.push_back({BundleChange::Kind::kDropped, bundle.name});
     }
   }
-  std::sort(changes.begin(), changes.end(),
-            [](const BundleChange& a, const BundleChange& b) { return a.name < b.name; });
+  std::ranges::sort(changes, {}, &BundleChange::name);
   return changes;
 }
 
@@ -207,17 +205,8 @@ bool is_geometry(PieceForm form) {
 }  // namespace
 
 const char* to_string(BundleChange::Kind kind) {
-  switch (kind) {
-    case BundleChange::Kind::kAdded:
-      return "added";
-    case BundleChange::Kind::kChanged:
-      return "changed";
-    case BundleChange::Kind::kKept:
-      return "kept";
-    case BundleChange::Kind::kDropped:
-      return "dropped";
-  }
-  return "";
+  constexpr const char* kNames[] = {"added", "changed", "kept", "dropped"};
+  return kNames[static_cast<std::size_t>(kind)];
 }
 
 Result<PublishReport> publish(const PublishRequest& request, const SecretKey& key, Report& report) {
@@ -245,8 +234,7 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
       if (bundle.name == name) bundle.devices = devices;
     }
   }
-  std::sort(done.release.bundles.begin(), done.release.bundles.end(),
-            [](const ReleaseBundle& a, const ReleaseBundle& b) { return a.name < b.name; });
+  std::ranges::sort(done.release.bundles, {}, &ReleaseBundle::name);
   done.changes = changes_between(before, done.release.bundles);
   // A document that devices would refuse is not published.
   if (const std::size_t size = release_text(done.release).size(); size > kMaxReleaseBytes) {

@@ -321,8 +321,7 @@ class RecipeMaker {
 
   /// Drafts what no piece covers yet between two offsets.
   void draft_gaps(std::uint64_t begin, std::uint64_t end, Cut cut) {
-    std::sort(covered_.begin(), covered_.end(),
-              [](const Covered& a, const Covered& b) { return a.begin < b.begin; });
+    std::ranges::sort(covered_, {}, &Covered::begin);
     for (const Covered& covered : covered_) {
       if (covered.end <= begin || covered.begin >= end) continue;
       draft_bytes(begin, covered.begin, cut);
@@ -343,8 +342,7 @@ class RecipeMaker {
       draft.record.offset = begin;
       draft.record.raw_size = static_cast<std::uint32_t>(size);
       draft.blocks = cut == Cut::kBlocks;
-      const bool zero =
-          std::all_of(raw.begin(), raw.end(), [](std::byte b) { return b == std::byte{0}; });
+      const bool zero = std::ranges::all_of(raw, [](std::byte b) { return b == std::byte{0}; });
       if (!zero) drafts_.push_back(std::move(draft));
       begin += size;
     }

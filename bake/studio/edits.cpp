@@ -84,15 +84,13 @@ class Edits {
 
   [[nodiscard]] const ProjectAsset* find(const std::string& table, const std::string& name) const {
     const auto& list = assets(table);
-    const auto found = std::find_if(list.begin(), list.end(),
-                                    [&](const ProjectAsset& asset) { return asset.name == name; });
+    const auto found = std::ranges::find(list, name, &ProjectAsset::name);
     return found == list.end() ? nullptr : &*found;
   }
 
   [[nodiscard]] std::size_t sharing(const std::string& table, std::size_t index) const {
     const auto& list = assets(table);
-    return static_cast<std::size_t>(std::count_if(
-        list.begin(), list.end(), [&](const ProjectAsset& asset) { return asset.table == index; }));
+    return static_cast<std::size_t>(std::ranges::count(list, index, &ProjectAsset::table));
   }
 
   [[nodiscard]] std::optional<std::size_t> scene_of(const std::string& pattern,

@@ -56,9 +56,7 @@ Json finding_json(const WeighedIssue& weighed) {
 }
 
 Json findings_json(const Verdict& verdict) {
-  Json findings = Json::array();
-  for (const WeighedIssue& weighed : verdict.issues()) findings.push_back(finding_json(weighed));
-  return findings;
+  return Json::list(verdict.issues(), finding_json);
 }
 
 Result<Json> check(Session& session, const std::string& device) {
@@ -132,15 +130,13 @@ Result<Json> sizes(Session& session) {
   std::uint64_t told = 0;
   for (const Part& part : parts) told += part.bytes;
   parts.push_back({"other", "", whole > told ? whole - told : 0});
-  std::stable_sort(parts.begin(), parts.end(),
-                   [](const Part& a, const Part& b) { return a.bytes > b.bytes; });
-  Json list = Json::array();
-  for (const Part& part : parts) {
-    list.push_back({{"kind", part.kind},
-                    {"name", part.name},
-                    {"bytes", part.bytes},
-                    {"share", static_cast<double>(part.bytes) / static_cast<double>(whole)}});
-  }
+  std::ranges::stable_sort(parts, std::greater(), &Part::bytes);
+  Json list = Json::list(parts, [&](const Part& part) -> Json {
+    return {{"kind", part.kind},
+            {"name", part.name},
+            {"bytes", part.bytes},
+            {"share", static_cast<double>(part.bytes) / static_cast<double>(whole)}};
+  });
   return Json{{"bytes", whole}, {"parts", std::move(list)}};
 }
 

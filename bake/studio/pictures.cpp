@@ -94,9 +94,9 @@ Result<std::array<PixelPoint, 4>> corners_in(const Json& body) {
 }
 
 Json corners_json(const std::array<PixelPoint, 4>& corners) {
-  Json json = Json::array();
-  for (const PixelPoint& corner : corners) json.push_back(Json::array({corner.x, corner.y}));
-  return json;
+  return Json::list(corners, [&](const PixelPoint& corner) {
+    return Json::array({corner.x, corner.y});
+  });
 }
 
 double number_in(const Json& body, const char* key) {
@@ -165,14 +165,12 @@ Result<std::shared_ptr<const GradedPattern>> graded(Session& session, const Name
 
 Json score_json(const GradedPattern& one) {
   const PatternScore& score = one.score;
-  Json advice = Json::array();
-  for (const ScoreCause& cause : score.causes) {
-    advice.push_back({{"id", cause.id}, {"value", cause.value}, {"text", cause.advice}});
-  }
-  Json features = Json::array();
-  for (const ScorePlace& place : score.places) {
-    features.push_back(Json::array({place.x, place.y, place.held}));
-  }
+  const Json advice = Json::list(score.causes, [&](const ScoreCause& cause) -> Json {
+    return {{"id", cause.id}, {"value", cause.value}, {"text", cause.advice}};
+  });
+  const Json features = Json::list(score.places, [&](const ScorePlace& place) {
+    return Json::array({place.x, place.y, place.held});
+  });
   const double cm = one.width_mm / 10;
   Json json = {
       {"pattern", one.pattern.name},
@@ -233,8 +231,7 @@ Result<std::vector<NamedAsset>> nearest_to(Session& session, const NamedAsset& n
     if (!photo) continue;  // its own error is told where it is shown
     others.emplace_back(likeness(own.pattern.picture, gray_of((*photo)->image)), std::move(other));
   }
-  std::stable_sort(others.begin(), others.end(),
-                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::ranges::stable_sort(others, std::greater(), &decltype(others)::value_type::first);
   std::vector<NamedAsset> nearest;
   for (std::size_t i = 0; i < std::min(kNearest, others.size()); ++i) {
     nearest.push_back(std::move(others[i].second));

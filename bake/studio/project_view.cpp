@@ -86,17 +86,8 @@ Json asset_json(const Session& session, const ProjectAsset& asset,
 }
 
 const char* shape_word(ShapeRequest::Kind kind) {
-  switch (kind) {
-    case ShapeRequest::Kind::kCylinder:
-      return "cylinder";
-    case ShapeRequest::Kind::kCone:
-      return "cone";
-    case ShapeRequest::Kind::kBox:
-      return "box";
-    case ShapeRequest::Kind::kFlat:
-      break;
-  }
-  return "flat";
+  constexpr const char* kWords[] = {"flat", "cylinder", "cone", "box"};
+  return kWords[static_cast<std::size_t>(kind)];
 }
 
 Json pattern_json(const Session& session, const ProjectAsset& asset,
@@ -236,8 +227,8 @@ Json phone_of(Session& session) {
 }
 
 Json devices_json() {
-  Json names = Json::array();
-  for (const DeviceProfile& device : device_profiles()) names.push_back(device.name);
+  const Json names =
+      Json::list(device_profiles(), [&](const DeviceProfile& device) { return device.name; });
   return names;
 }
 

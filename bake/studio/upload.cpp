@@ -142,10 +142,9 @@ Result<std::string> listed_text(const Session& session, const std::string& text,
     const bool plain = pattern.globs.size() == 1 && pattern.globs[0] == as_glob(pattern.file) &&
                        pattern.width_mm == 0 && pattern.shape.text.empty() &&
                        pattern.settings.empty();
-    const bool placed = std::any_of(draft.project.scenes.begin(), draft.project.scenes.end(),
-                                    [&](const ProjectScene& scene) {
-                                      return scene.table && scene.request.pattern == pattern.name;
-                                    });
+    const bool placed = std::ranges::any_of(draft.project.scenes, [&](const ProjectScene& scene) {
+      return scene.table && scene.request.pattern == pattern.name;
+    });
     if (!plain || placed || is_in(found.pictures, pattern.file)) continue;
     leaving.push_back({{"op", "delete"}, {"table", "pattern"}, {"name", pattern.name}});
   }

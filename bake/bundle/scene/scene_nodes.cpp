@@ -156,8 +156,7 @@ std::uint32_t index_of(const BundleContent& content, const std::vector<Record>& 
   const auto named = [&](const Record& record) {
     return content.names.compare(record.name.offset, record.name.length, name) == 0;
   };
-  return static_cast<std::uint32_t>(std::find_if(records.begin(), records.end(), named) -
-                                    records.begin());
+  return static_cast<std::uint32_t>(std::ranges::find_if(records, named) - records.begin());
 }
 
 class NodeMaker {
@@ -265,8 +264,7 @@ class NodeMaker {
   Result<std::uint32_t> add_media(const NodeRequest& request) {
     MODAR_ASSIGN(const BundleContent part,
                  source_ ? source_(request) : bake_media(request, request_, report_));
-    const auto same =
-        std::find(content_.media_data.begin(), content_.media_data.end(), part.media_data[0]);
+    const auto same = std::ranges::find(content_.media_data, part.media_data[0]);
     const auto index = static_cast<std::uint32_t>(same - content_.media_data.begin());
     if (same != content_.media_data.end()) return index;
     MediaRecord media = part.media[0];

@@ -215,9 +215,8 @@ Result<std::vector<PatternRange>> check_poses(const BundleView& bundle,
   };
   for (std::uint32_t p = 0; p < bundle.patterns().size(); ++p) {
     const PatternRecord& record = bundle.patterns()[p];
-    const auto path = std::find_if(
-        options.pictures.begin(), options.pictures.end(),
-        [&](const PatternRequest& source) { return source.name == bundle.name(record.name); });
+    const auto path =
+        std::ranges::find(options.pictures, bundle.name(record.name), &PatternRequest::name);
     if (path == options.pictures.end()) {
       tell(bundle, record, sink, WorkstationRule::kSourceMissing,
            "its picture is needed to render views of it");

@@ -296,9 +296,8 @@ Result<std::vector<ModelLook>> check_looks(const BundleView& bundle, const Visua
   std::vector<std::uint32_t> models;  // of the looks
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
     const ModelRecord& model = bundle.models()[m];
-    const auto path = std::find_if(
-        options.models.begin(), options.models.end(),
-        [&](const ModelRequest& source) { return source.name == bundle.name(model.name); });
+    const auto path =
+        std::ranges::find(options.models, bundle.name(model.name), &ModelRequest::name);
     if (path == options.models.end()) continue;  // SOURCE_MISSING reports it
     MODAR_ASSIGN(ModelLook look, looker.look(m, *path));
     looks.push_back(std::move(look));

@@ -30,8 +30,7 @@ std::vector<Json> entries_of(const Json& document, const char* kind) {
 /// A name of a scene or a pattern that is among the sources: others cannot be baked.
 template <class Range>
 bool is_given(const Range& sources, const std::string& name) {
-  return std::any_of(sources.begin(), sources.end(),
-                     [&](const auto& source) { return source.name == name; });
+  return std::ranges::any_of(sources, [&](const auto& source) { return source.name == name; });
 }
 
 void take_three(const Json& stated, const char* key, std::array<double, 3>& values) {

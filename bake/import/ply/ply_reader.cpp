@@ -61,32 +61,13 @@ class PlyValues {
     if (left() < size) return false;
     const char* const from = bytes_.data() + at_;
     at_ += size;
-    switch (type) {
-      case PlyType::kI8:
-        value = value_of<std::int8_t>(from);
-        break;
-      case PlyType::kU8:
-        value = value_of<std::uint8_t>(from);
-        break;
-      case PlyType::kI16:
-        value = value_of<std::int16_t>(from);
-        break;
-      case PlyType::kU16:
-        value = value_of<std::uint16_t>(from);
-        break;
-      case PlyType::kI32:
-        value = value_of<std::int32_t>(from);
-        break;
-      case PlyType::kU32:
-        value = value_of<std::uint32_t>(from);
-        break;
-      case PlyType::kF32:
-        value = value_of<float>(from);
-        break;
-      case PlyType::kF64:
-        value = value_of<double>(from);
-        break;
-    }
+    static constexpr double (PlyValues::*kReaders[])(const char*)
+        const = {// of PlyType
+                 &PlyValues::value_of<std::int8_t>,  &PlyValues::value_of<std::uint8_t>,
+                 &PlyValues::value_of<std::int16_t>, &PlyValues::value_of<std::uint16_t>,
+                 &PlyValues::value_of<std::int32_t>, &PlyValues::value_of<std::uint32_t>,
+                 &PlyValues::value_of<float>,        &PlyValues::value_of<double>};
+    value = (this->*kReaders[static_cast<std::size_t>(type)])(from);
     return true;
   }
 
