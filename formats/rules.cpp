@@ -157,7 +157,7 @@ constexpr IssueKind kIssueKinds[] = {
 static_assert(std::size(kIssueKinds) == static_cast<std::size_t>(Rule::kCount));
 
 const char* severity_word(Severity severity) {
-  constexpr const char* kWords[] = {"error", "warning", "info"};
+  static constexpr char kWords[][8] = {"error", "warning", "info"};  // no pointers to relocate
   return kWords[static_cast<std::size_t>(severity)];
 }
 

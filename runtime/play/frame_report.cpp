@@ -221,7 +221,7 @@ bool draws_in_software(std::string_view gl_renderer) {
 }
 
 const char* to_string(Shown state) {
-  constexpr const char* kNames[] = {"shown", "held", "hidden"};
+  static constexpr char kNames[][7] = {"shown", "held", "hidden"};  // no pointers to relocate
   return kNames[static_cast<std::size_t>(state)];
 }
 
