@@ -936,11 +936,7 @@ void check_scene(const RecordCheck& check, const BundleParts& parts, const Scene
                 "pattern " + std::to_string(scene.pattern) + " or model " +
                     std::to_string(scene.model) + " is not there");
   }
-  double square = 0.0;
-  for (const float part : scene.rotation) {
-    square += static_cast<double>(part) * static_cast<double>(part);
-  }
-  if (!(std::fabs(square - 1.0) <= 1e-4)) {
+  if (!unit_length(scene.rotation)) {
     check.fault(Rule::kScene, scene.rotation, "its rotation is not a unit quaternion");
   }
 }
@@ -974,11 +970,7 @@ void check_light(const RecordCheck& check, const BundleParts& parts, std::uint32
     check.fault(Rule::kScene, &light.scene,
                 "scene " + std::to_string(light.scene) + " is not there or out of order");
   }
-  double square = 0.0;
-  for (const float part : light.direction) {
-    square += static_cast<double>(part) * static_cast<double>(part);
-  }
-  if (!(std::fabs(square - 1.0) <= 1e-4)) {
+  if (!unit_length(light.direction)) {
     check.fault(Rule::kScene, light.direction, "the direction to its light has no unit length");
   }
 }

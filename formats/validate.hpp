@@ -1,6 +1,7 @@
 // The parts of validation that BundleView::open() and check_bundle() share. Internal to formats/.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -53,6 +54,14 @@ inline std::span<const std::byte> section_bytes(const BundleParts& parts,
 /// ignored.
 inline bool newer_minor(const BundleParts& parts) {
   return reinterpret_cast<const FileHeader*>(parts.bytes.data())->minor > kMinorVersion;
+}
+
+/// A direction, or a quaternion that turns and does nothing else.
+template <std::size_t N>
+bool unit_length(const float (&parts)[N]) {
+  double square = 0.0;
+  for (const float part : parts) square += static_cast<double>(part) * static_cast<double>(part);
+  return std::fabs(square - 1.0) <= 1e-4;
 }
 
 /// One record under test: tells faults where they are.

@@ -23,13 +23,6 @@ std::string_view text_of(const BundleParts& parts, NameRef ref) {
 }
 
 template <std::size_t N>
-bool unit_length(const float (&parts)[N]) {
-  double square = 0.0;
-  for (const float part : parts) square += static_cast<double>(part) * static_cast<double>(part);
-  return std::fabs(square - 1.0) <= 1e-4;
-}
-
-template <std::size_t N>
 bool zero(const float (&parts)[N]) {
   return std::all_of(std::begin(parts), std::end(parts), [](float part) { return part == 0.0f; });
 }
