@@ -77,7 +77,29 @@ void append_bytes(std::vector<std::byte> bytes, std::vector<std::byte>& to) {
   }
 }
 
-/// Appends a model's records and bytes, shifting what counts from the model's own start.
+/// Appends chunks and levels of a mesh to these and its bytes to those of the content, shifting
+/// what counts from the mesh's own start.
+void append_geometry(PackedMesh packed, std::uint32_t first_material,
+                     std::vector<ChunkRecord>& chunks, std::vector<LevelRecord>& levels,
+                     BundleContent& content) {
+  const auto first_level = static_cast<std::uint32_t>(levels.size());
+  for (ChunkRecord chunk : packed.chunks) {
+    chunk.material += first_material;
+    chunk.first_level += first_level;
+    chunks.push_back(chunk);
+  }
+  for (LevelRecord level : packed.levels) {
+    level.vertex_offset += content.vertices.size();
+    level.index_offset += content.indices.size();
+    levels.push_back(level);
+  }
+  append_bytes(std::move(packed.vertices), content.vertices);
+  append_bytes(std::move(packed.indices), content.indices);
+  // Keeps the next mesh's vertices on a 4-byte boundary.
+  content.indices.resize((content.indices.size() + 3) / 4 * 4);
+}
+
+/// Appends a model's records and bytes.
 void merge_model(PackedMesh packed, const std::vector<TextureOutcome>& textures,
                  BundleContent& content) {
   ModelRecord record = packed.record;
@@ -88,17 +110,6 @@ void merge_model(PackedMesh packed, const std::vector<TextureOutcome>& textures,
   record.chunk_count = static_cast<std::uint32_t>(packed.chunks.size());
   record.first_material = static_cast<std::uint32_t>(content.materials.size());
   record.material_count = static_cast<std::uint32_t>(packed.materials.size());
-  const auto first_level = static_cast<std::uint32_t>(content.levels.size());
-  for (ChunkRecord chunk : packed.chunks) {
-    chunk.material += record.first_material;
-    chunk.first_level += first_level;
-    content.chunks.push_back(chunk);
-  }
-  for (LevelRecord level : packed.levels) {
-    level.vertex_offset += content.vertices.size();
-    level.index_offset += content.indices.size();
-    content.levels.push_back(level);
-  }
   for (std::size_t m = 0; m < packed.materials.size(); ++m) {
     MaterialRecord material = packed.materials[m];
     material.name = content.intern(packed.sources[m].name);
@@ -106,10 +117,8 @@ void merge_model(PackedMesh packed, const std::vector<TextureOutcome>& textures,
     if (textures[m].constant) fold_constant(textures[m].rgba, material);
     content.materials.push_back(material);
   }
-  append_bytes(std::move(packed.vertices), content.vertices);
-  append_bytes(std::move(packed.indices), content.indices);
-  // Keeps the next model's vertices on a 4-byte boundary.
-  content.indices.resize((content.indices.size() + 3) / 4 * 4);
+  append_geometry(std::move(packed), record.first_material, content.chunks, content.levels,
+                  content);
   content.models.push_back(record);
 }
 
@@ -118,20 +127,8 @@ void merge_stand_in(PackedMesh packed, BundleContent& content) {
   content.stand_ins.push_back({static_cast<std::uint32_t>(content.models.size() - 1),
                                static_cast<std::uint32_t>(content.stand_in_chunks.size()),
                                static_cast<std::uint32_t>(packed.chunks.size()), 0});
-  const auto first_level = static_cast<std::uint32_t>(content.stand_in_levels.size());
-  for (ChunkRecord chunk : packed.chunks) {
-    chunk.material += content.models.back().first_material;
-    chunk.first_level += first_level;
-    content.stand_in_chunks.push_back(chunk);
-  }
-  for (LevelRecord level : packed.levels) {
-    level.vertex_offset += content.vertices.size();
-    level.index_offset += content.indices.size();
-    content.stand_in_levels.push_back(level);
-  }
-  append_bytes(std::move(packed.vertices), content.vertices);
-  append_bytes(std::move(packed.indices), content.indices);
-  content.indices.resize((content.indices.size() + 3) / 4 * 4);
+  append_geometry(std::move(packed), content.models.back().first_material, content.stand_in_chunks,
+                  content.stand_in_levels, content);
 }
 
 /// The order of the last model's triangles that are seen through.

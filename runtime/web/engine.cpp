@@ -184,6 +184,17 @@ auto with_triangles(const Read& read) {
   return engine.in_memory ? read() : engine.arriving->with_stand_ins(read);
 }
 
+/// Rows without gaps.
+modar_picture rgba_picture(const uint8_t* pixels, int width, int height) {
+  auto picture = modar::sized<modar_picture>();
+  picture.format = MODAR_RGBA;
+  picture.width = width;
+  picture.height = height;
+  picture.planes[0] = pixels;
+  picture.strides[0] = 4 * static_cast<ptrdiff_t>(width);
+  return picture;
+}
+
 /// A canvas that a frame of web_camera() covers.
 modar_surface surface_of(int width, int height, int mirror) {
   auto surface = modar::sized<modar_surface>();
@@ -519,12 +530,7 @@ EMSCRIPTEN_KEEPALIVE const char* web_reason() {
 
 /// Gray in place of RGBA.
 EMSCRIPTEN_KEEPALIVE void web_gray_from_rgba(uint8_t* pixels, int width, int height) {
-  auto picture = modar::sized<modar_picture>();
-  picture.format = MODAR_RGBA;
-  picture.width = width;
-  picture.height = height;
-  picture.planes[0] = pixels;
-  picture.strides[0] = 4 * static_cast<ptrdiff_t>(width);
+  const modar_picture picture = rgba_picture(pixels, width, height);
   modar_gray(&picture, pixels, nullptr);
 }
 /// A gray picture of `factor` times the size becomes width x height, in place.
@@ -567,12 +573,7 @@ EMSCRIPTEN_KEEPALIVE void web_draw(int width, int height, int mirror, float turn
 }
 /// The light on the patterns of web_poses(), as a copy of their frame shows it: RGBA.
 EMSCRIPTEN_KEEPALIVE void web_look(const uint8_t* pixels, int width, int height) {
-  auto picture = modar::sized<modar_picture>();
-  picture.format = MODAR_RGBA;
-  picture.width = width;
-  picture.height = height;
-  picture.planes[0] = pixels;
-  picture.strides[0] = 4 * static_cast<ptrdiff_t>(width);
+  const modar_picture picture = rgba_picture(pixels, width, height);
   modar_renderer_observe(engine.renderer, &picture, &engine.camera, engine.items,
                          collect_items(0.0f, 1.0f));
 }
