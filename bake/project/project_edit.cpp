@@ -40,7 +40,8 @@ std::string quoted(const std::string& text) {
   return out + "\"";
 }
 
-bool is_utf8(std::string_view text) {
+/// With control characters, which are escaped.
+bool is_any_utf8(std::string_view text) {
   while (!text.empty()) {
     const auto byte = static_cast<unsigned char>(text[0]);
     const bool control = byte < 0x20 || byte == 0x7F;
@@ -55,7 +56,7 @@ bool is_utf8(std::string_view text) {
 
 Result<std::string> toml_of(const Json& value) {
   if (const auto text = value.text()) {
-    if (!is_utf8(*text)) return no_edit("the text is not UTF-8");
+    if (!is_any_utf8(*text)) return no_edit("the text is not UTF-8");
     return quoted(*text);
   }
   if (const auto truth = value.truth()) return std::string(*truth ? "true" : "false");

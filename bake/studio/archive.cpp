@@ -43,15 +43,6 @@ tl::unexpected<Error> damaged(const std::string& archive) {
   return bad_zip("zip.damaged", archive, "the archive is damaged", "pack it again");
 }
 
-bool is_utf8(std::string_view text) {
-  while (!text.empty()) {
-    const std::size_t size = utf8_character(text);
-    if (size == 0) return false;
-    text.remove_prefix(size);
-  }
-  return true;
-}
-
 /// Windows writes names in the code page of DOS, whose letters above 127 are these.
 std::string from_code_page_437(std::string_view name) {
   constexpr std::u16string_view kLetters =

@@ -18,15 +18,6 @@ tl::unexpected<Error> bad_name(std::string_view name, const char* cause) {
               "rename the file, and drop it again");
 }
 
-bool is_readable(std::string_view text) {
-  while (!text.empty()) {
-    const std::size_t size = utf8_character(text);
-    if (size == 0) return false;
-    text.remove_prefix(size);
-  }
-  return true;
-}
-
 /// Whether `path`, all links followed, lies in the folder.
 bool lies_in(const fs::path& path, const std::string& folder) {
   std::error_code error;
@@ -41,7 +32,7 @@ bool lies_in(const fs::path& path, const std::string& folder) {
 
 Result<void> check_name(std::string_view name) {
   if (name.empty() || name.size() > kLongestName) return bad_name(name, "the name is too long");
-  if (!is_readable(name) || name.find('\\') != std::string_view::npos) {
+  if (!is_utf8(name) || name.find('\\') != std::string_view::npos) {
     return bad_name(name, "the name has characters that file names cannot have");
   }
   for (std::size_t begin = 0; begin <= name.size();) {

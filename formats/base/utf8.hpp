@@ -28,6 +28,16 @@ inline std::size_t utf8_character(std::string_view text) {
   return tail(3) ? 4 : 0;
 }
 
+/// All of it is such characters.
+inline bool is_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t size = utf8_character(text);
+    if (size == 0) return false;
+    text.remove_prefix(size);
+  }
+  return true;
+}
+
 /// The text with its control characters as "\x1B": none of it commands the terminal that it is
 /// printed to, and none of it begins a line of its own.
 inline std::string printable(std::string_view text) {
