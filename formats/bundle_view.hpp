@@ -28,6 +28,24 @@ class Table {
     return *reinterpret_cast<const T*>(at);
   }
 
+  /// Goes through the records; the table outlives it.
+  class Iterator {
+   public:
+    Iterator(const Table& table, std::uint32_t index) : table_(&table), index_(index) {}
+    const T& operator*() const { return (*table_)[index_]; }
+    Iterator& operator++() {
+      ++index_;
+      return *this;
+    }
+    bool operator==(const Iterator&) const = default;
+
+   private:
+    const Table* table_;
+    std::uint32_t index_;
+  };
+  [[nodiscard]] Iterator begin() const { return {*this, 0}; }
+  [[nodiscard]] Iterator end() const { return {*this, size()}; }
+
   /// Continues with the records of another section.
   void append(const Table& more) {
     more_ = more.first_;
@@ -48,8 +66,8 @@ class Table {
 
 /// The byte of a layout's vertices that holds occlusion, or kNone.
 inline std::uint32_t occlusion_byte(const Table<OcclusionRecord>& records, std::uint32_t layout) {
-  for (std::uint32_t i = 0; i < records.size(); ++i) {
-    if (records[i].layout == layout) return records[i].offset;
+  for (const OcclusionRecord& record : records) {
+    if (record.layout == layout) return record.offset;
   }
   return kNone;
 }

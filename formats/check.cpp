@@ -355,11 +355,8 @@ void check_stand_in_order(FaultLog& log, const BundleParts& parts, std::uint32_t
 }
 
 void check_model_records(FaultLog& log, const BundleParts& parts) {
-  for (std::uint32_t i = 0; i < parts.materials.size(); ++i) {
-    check_material(log, parts, parts.materials[i]);
-  }
-  for (std::uint32_t i = 0; i < parts.models.size(); ++i) {
-    const ModelRecord& model = parts.models[i];
+  for (const MaterialRecord& material : parts.materials) check_material(log, parts, material);
+  for (const ModelRecord& model : parts.models) {
     check_placement(log, parts, model);
     check_errors(log, parts, model);
     check_counts(log, parts, model);
@@ -573,9 +570,7 @@ void check_findable(FaultLog& log, const BundleParts& parts, std::uint32_t index
 }
 
 void check_patterns(FaultLog& log, const BundleParts& parts) {
-  for (std::uint32_t i = 0; i < parts.parameter_sets.size(); ++i) {
-    check_parameter_set(log, parts, parts.parameter_sets[i]);
-  }
+  for (const ParameterSetRecord& set : parts.parameter_sets) check_parameter_set(log, parts, set);
   for (std::uint32_t i = 0; i < parts.patterns.size(); ++i) check_findable(log, parts, i);
   for (const SectionEntry& entry : parts.sections) {
     const auto type = static_cast<SectionType>(entry.type);
@@ -630,11 +625,11 @@ void check_minor(FaultLog& log, const BundleParts& parts, bool accept_newer) {
   for (const SectionEntry& entry : parts.sections) {
     needed = std::max(needed, section_since(entry.type));
   }
-  for (std::uint32_t i = 0; i < parts.materials.size(); ++i) {
-    needed = std::max(needed, flags_since("MaterialRecord", parts.materials[i].flags));
+  for (const MaterialRecord& material : parts.materials) {
+    needed = std::max(needed, flags_since("MaterialRecord", material.flags));
   }
-  for (std::uint32_t i = 0; i < parts.textures.size(); ++i) {
-    needed = std::max(needed, flags_since("TextureRecord", parts.textures[i].flags));
+  for (const TextureRecord& texture : parts.textures) {
+    needed = std::max(needed, flags_since("TextureRecord", texture.flags));
   }
   const std::string states = "it states 1." + std::to_string(header.minor) + ", ";
   if (header.minor < needed) {

@@ -18,7 +18,7 @@ template <class T>
 std::vector<T> records_of(const Table<T>& table) {
   std::vector<T> records;
   records.reserve(table.size());
-  for (std::uint32_t i = 0; i < table.size(); ++i) records.push_back(table[i]);
+  for (const auto& each : table) records.push_back(each);
   return records;
 }
 

@@ -623,8 +623,8 @@ void validate_models(FaultLog& log, const BundleParts& parts) {
   if (log.errors() != faults) return;
   // Levels that shared indices could make a small file cost any time to draw or check.
   std::uint64_t index_bytes = 0;
-  for (std::uint32_t i = 0; i < parts.levels.size(); ++i) {
-    index_bytes += std::uint64_t{parts.levels[i].index_count} * 2;
+  for (const LevelRecord& level : parts.levels) {
+    index_bytes += std::uint64_t{level.index_count} * 2;
   }
   if (index_bytes > parts.indices.size()) {
     log.add(Rule::kLevelRange, 0, "levels",

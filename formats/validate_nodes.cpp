@@ -297,12 +297,11 @@ void check_languages(FaultLog& log, const BundleParts& parts, const NodeTexts& t
   };
   std::set<std::string> languages;
   for (const auto& text : texts) {
-    for (std::uint32_t i = 0; i < parts.nodes.size(); ++i) {
-      if (asked(parts.nodes[i]) && has(parts.nodes[i], text[2])) languages.insert(text[2]);
+    for (const NodeRecord& each : parts.nodes) {
+      if (asked(each) && has(each, text[2])) languages.insert(text[2]);
     }
   }
-  for (std::uint32_t i = 0; i < parts.nodes.size(); ++i) {
-    const NodeRecord& node = parts.nodes[i];
+  for (const NodeRecord& node : parts.nodes) {
     if (!asked(node)) continue;
     const std::string where = label(parts, what, node.name);
     const char* text = rule == Rule::kNodeText ? "title" : "captions";

@@ -241,8 +241,7 @@ Json shape_json(const BundleView& bundle, std::uint32_t index) {
 Json pattern_json(const BundleView& bundle, std::uint32_t index) {
   const PatternRecord& pattern = bundle.patterns()[index];
   Json keypoints = Json::object();
-  for (std::uint32_t s = 0; s < bundle.parameter_sets().size(); ++s) {
-    const ParameterSetRecord& set = bundle.parameter_sets()[s];
+  for (const ParameterSetRecord& set : bundle.parameter_sets()) {
     if (bundle.section(SectionType::kMappedFeatures, index, set.id).empty()) continue;
     keypoints.set(bundle.name(set.name), bundle.features(index, set.id).keypoints.size());
   }
@@ -525,13 +524,12 @@ Json action_json(const BundleView& bundle, std::uint32_t index) {
 /// Labels and actions of a pattern.
 std::pair<int, int> acting_counts(const BundleView& bundle, std::uint32_t pattern) {
   std::pair<int, int> counts;
-  for (std::uint32_t n = 0; n < bundle.nodes().size(); ++n) {
-    const NodeRecord& node = bundle.nodes()[n];
+  for (const NodeRecord& node : bundle.nodes()) {
     counts.first +=
         node.pattern == pattern && node.kind == static_cast<std::uint32_t>(NodeKind::kLabel);
   }
-  for (std::uint32_t a = 0; a < bundle.actions().size(); ++a) {
-    counts.second += pattern_of(bundle, bundle.actions()[a]) == pattern;
+  for (const ActionRecord& each : bundle.actions()) {
+    counts.second += pattern_of(bundle, each) == pattern;
   }
   return counts;
 }

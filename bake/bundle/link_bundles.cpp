@@ -152,8 +152,7 @@ class Linker {
                      std::uint32_t first_material) {
     const std::uint32_t chunks = part.chunks().own().size();
     const std::uint32_t levels = part.levels().own().size();
-    for (std::uint32_t s = 0; s < part.stand_ins().size(); ++s) {
-      StandInRecord record = part.stand_ins()[s];
+    for (StandInRecord record : part.stand_ins()) {
       record.model = static_cast<std::uint32_t>(content_.models.size());
       record.first_chunk += static_cast<std::uint32_t>(content_.stand_in_chunks.size()) - chunks;
       content_.stand_ins.push_back(record);
@@ -190,8 +189,7 @@ class Linker {
   }
 
   void add_parameter_sets(const BundleView& part) {
-    for (std::uint32_t s = 0; s < part.parameter_sets().size(); ++s) {
-      ParameterSetRecord set = part.parameter_sets()[s];
+    for (ParameterSetRecord set : part.parameter_sets()) {
       set.name = content_.intern(part.name(set.name));
       index_in(content_.parameter_sets, set);
     }
@@ -206,8 +204,8 @@ class Linker {
       add_extra(part, type, 0, static_cast<std::uint32_t>(content_.patterns.size()));
     }
     std::vector<FeatureContent> features;
-    for (std::uint32_t s = 0; s < part.parameter_sets().size(); ++s) {
-      const std::uint32_t set = part.parameter_sets()[s].id;
+    for (const ParameterSetRecord& each : part.parameter_sets()) {
+      const std::uint32_t set = each.id;
       const FeatureView view = part.features(0, set);
       if (view.descriptor_bytes == 0) continue;
       features.push_back({set,

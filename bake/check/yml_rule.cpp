@@ -62,8 +62,8 @@ bool check_yml_twins(std::span<const std::byte> bytes, const IssueSink& sink) {
   if (!bundle) return false;
   bool good = true;
   for (std::uint32_t p = 0; p < bundle->patterns().size(); ++p) {
-    for (std::uint32_t s = 0; s < bundle->parameter_sets().size(); ++s) {
-      good = check_pair(*bundle, p, bundle->parameter_sets()[s], sink) && good;
+    for (const ParameterSetRecord& each : bundle->parameter_sets()) {
+      good = check_pair(*bundle, p, each, sink) && good;
     }
   }
   return good;
@@ -73,8 +73,7 @@ bool check_yml_twin(std::span<const std::byte> bytes, std::uint32_t pattern, std
                     const IssueSink& sink) {
   const Result<BundleView> bundle = BundleView::open(bytes);
   if (!bundle || pattern >= bundle->patterns().size()) return false;
-  for (std::uint32_t s = 0; s < bundle->parameter_sets().size(); ++s) {
-    const ParameterSetRecord& set = bundle->parameter_sets()[s];
+  for (const ParameterSetRecord& set : bundle->parameter_sets()) {
     if (set.id == set_id) return check_pair(*bundle, pattern, set, sink);
   }
   return false;

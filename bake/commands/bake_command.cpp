@@ -106,8 +106,7 @@ void print_summary(const BundleView& bundle, const Report& report, const std::st
       std::fprintf(stderr, "        %s\n", levels.c_str());
     }
   }
-  for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
-    const TextureRecord& texture = bundle.textures()[t];
+  for (const TextureRecord& texture : bundle.textures()) {
     std::fprintf(stderr, "texture %-16s %u x %u, %u levels, %.2f dB\n",
                  std::string(bundle.name(texture.name)).c_str(), texture.width, texture.height,
                  texture.level_count, static_cast<double>(texture.psnr_db));
@@ -115,8 +114,7 @@ void print_summary(const BundleView& bundle, const Report& report, const std::st
   for (std::uint32_t p = 0; p < bundle.patterns().size(); ++p) {
     const PatternRecord& pattern = bundle.patterns()[p];
     std::string counts;
-    for (std::uint32_t s = 0; s < bundle.parameter_sets().size(); ++s) {
-      const ParameterSetRecord& set = bundle.parameter_sets()[s];
+    for (const ParameterSetRecord& set : bundle.parameter_sets()) {
       counts += " " + std::string(bundle.name(set.name)) + "=" +
                 std::to_string(bundle.features(p, set.id).keypoints.size());
     }

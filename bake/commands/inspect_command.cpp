@@ -60,8 +60,8 @@ void print_textures(const BundleView& bundle) {
 void print_patterns(const BundleView& bundle) {
   if (bundle.patterns().empty()) return;
   std::printf("\n%-18s %11s %9s", "pattern", "size", "width");
-  for (std::uint32_t s = 0; s < bundle.parameter_sets().size(); ++s) {
-    std::printf(" %9s", std::string(bundle.name(bundle.parameter_sets()[s].name)).c_str());
+  for (const ParameterSetRecord& set : bundle.parameter_sets()) {
+    std::printf(" %9s", std::string(bundle.name(set.name)).c_str());
   }
   std::printf("\n");
   for (std::uint32_t p = 0; p < bundle.patterns().size(); ++p) {
@@ -71,8 +71,8 @@ void print_patterns(const BundleView& bundle) {
     if (pattern.width_mm > 0) std::snprintf(width, sizeof width, "%.4g mm", pattern.width_mm);
     std::printf("%-18s %11s %9s", std::string(bundle.name(pattern.name)).c_str(), size.c_str(),
                 width);
-    for (std::uint32_t s = 0; s < bundle.parameter_sets().size(); ++s) {
-      std::printf(" %9zu", bundle.features(p, bundle.parameter_sets()[s].id).keypoints.size());
+    for (const ParameterSetRecord& each : bundle.parameter_sets()) {
+      std::printf(" %9zu", bundle.features(p, each.id).keypoints.size());
     }
     std::printf("\n");
   }

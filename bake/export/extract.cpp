@@ -97,8 +97,7 @@ Result<void> Extraction::textures() {
 Result<void> Extraction::patterns() {
   for (std::uint32_t p = 0; p < bundle_.patterns().size(); ++p) {
     const std::string stem = clean_name(bundle_.name(bundle_.patterns()[p].name));
-    for (std::uint32_t s = 0; s < bundle_.parameter_sets().size(); ++s) {
-      const ParameterSetRecord& set = bundle_.parameter_sets()[s];
+    for (const ParameterSetRecord& set : bundle_.parameter_sets()) {
       const std::string_view yml = bundle_.feature_yml(p, set.id);
       if (yml.empty()) continue;
       const std::string name = stem + "." + clean_name(bundle_.name(set.name));

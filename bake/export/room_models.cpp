@@ -22,8 +22,7 @@ std::vector<RoomModel> models_in_room(const BundleView& bundle, std::uint32_t pa
   room[2] = {0, unit, 0, 0};
   room[3] = {0, 0, 0, 1};
   std::vector<RoomModel> models;
-  for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
-    const SceneRecord& scene = bundle.scenes()[s];
+  for (const SceneRecord& scene : bundle.scenes()) {
     if (scene.pattern != pattern) continue;
     models.push_back({scene.model, room * glm::dmat4(scene_matrix(scene))});
   }

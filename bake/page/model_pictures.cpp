@@ -29,8 +29,7 @@ constexpr double kDistance = 4.0;  // of the eye from the middle of a model in [
 /// Turns a model as its first scene does, so that z is up; one that stands in none as the bundle
 /// states its upright, else as it is.
 glm::dquat upright(const BundleView& bundle, std::uint32_t model) {
-  for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
-    const SceneRecord& scene = bundle.scenes()[s];
+  for (const SceneRecord& scene : bundle.scenes()) {
     if (scene.model != model) continue;
     const float* r = scene.rotation;
     return {r[3], r[0], r[1], r[2]};

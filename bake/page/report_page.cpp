@@ -169,9 +169,7 @@ class Page {
         print("<span>bundle version %u.%u</span></div>\n<ul class=\"counts\">",
               bundle_.header().major, bundle_.header().minor);
     std::uint64_t triangles = 0;
-    for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
-      triangles += bundle_.models()[m].triangle_count;
-    }
+    for (const ModelRecord& model : bundle_.models()) triangles += model.triangle_count;
     html_ += "<li><b>" + human_bytes(bundle_.bytes().size()) + "</b>in one file</li>";
     const auto count = [&](std::uint64_t number, const char* what) {
       html_ += "<li><b>" + grouped(number) + "</b>" + noun(number, what) + "</li>";

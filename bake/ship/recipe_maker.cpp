@@ -202,8 +202,7 @@ class RecipeMaker {
 
   /// Indices of coarser levels, local to the vertices of level 0.
   void draft_levels() {
-    for (std::uint32_t c = 0; c < bundle_.chunks().size(); ++c) {
-      const ChunkRecord& chunk = bundle_.chunks()[c];
+    for (const ChunkRecord& chunk : bundle_.chunks()) {
       std::uint16_t base = 0xFFFF;
       for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
         const LevelRecord& level = bundle_.levels()[chunk.first_level + l];

@@ -87,12 +87,9 @@ struct Part {
 std::vector<Part> parts_of(const BundleView& bundle) {
   std::vector<Part> parts;
   std::uint64_t triangles = 0;
-  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
-    triangles += bundle.models()[m].triangle_count;
-  }
+  for (const ModelRecord& model : bundle.models()) triangles += model.triangle_count;
   const std::uint64_t geometry = bundle.vertices().size() + bundle.indices().size();
-  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
-    const ModelRecord& model = bundle.models()[m];
+  for (const ModelRecord& model : bundle.models()) {
     const double share =
         triangles == 0 ? 0
                        : static_cast<double>(model.triangle_count) / static_cast<double>(triangles);
@@ -112,8 +109,8 @@ std::vector<Part> parts_of(const BundleView& bundle) {
          {SectionType::kTrackerRecord, SectionType::kPatternShape, SectionType::kPatternColours}) {
       part.bytes += bundle.section(type, p).size();
     }
-    for (std::uint32_t s = 0; s < bundle.parameter_sets().size(); ++s) {
-      const std::uint32_t id = bundle.parameter_sets()[s].id;
+    for (const ParameterSetRecord& set : bundle.parameter_sets()) {
+      const std::uint32_t id = set.id;
       const FeatureView features = bundle.features(p, id);
       part.bytes += features.keypoints.size() * sizeof(KeypointRecord) +
                     features.descriptors.size() + bundle.feature_yml(p, id).size();

@@ -204,9 +204,9 @@ void use_stand_ins(std::span<std::byte> bytes, const BundleView& bundle) {
 }
 
 void show_coarsest(std::span<std::byte> bytes, const BundleView& bundle) {
-  for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
-    const std::uint32_t first = first_shown_level(bundle, bundle.textures()[t]);
-    TextureRecord& texture = writable(bytes, bundle, bundle.textures()[t]);
+  for (const TextureRecord& each : bundle.textures()) {
+    const std::uint32_t first = first_shown_level(bundle, each);
+    TextureRecord& texture = writable(bytes, bundle, each);
     texture.first_level += first;
     texture.level_count -= first;
     texture.width = bundle.texture_levels()[texture.first_level].width;

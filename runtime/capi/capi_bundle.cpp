@@ -164,8 +164,7 @@ int modar_pattern_bounds(const modar_bundle* bundle, uint32_t pattern, float low
       greatest = glm::max(greatest, placed);
     }
   }
-  for (uint32_t n = 0; n < bundle->view.nodes().size(); ++n) {
-    const modar::NodeRecord& node = bundle->view.nodes()[n];
+  for (const modar::NodeRecord& node : bundle->view.nodes()) {
     if (node.pattern != pattern || node.kind == static_cast<uint32_t>(modar::NodeKind::kModel)) {
       continue;
     }

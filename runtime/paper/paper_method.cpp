@@ -78,8 +78,8 @@ Result<std::unique_ptr<PaperTracker>> PaperTracker::create(const BundleView& bun
     auto state = std::make_unique<State>();
     state->camera = camera;
     const Table<ParameterSetRecord> sets = bundle.parameter_sets();
-    for (std::uint32_t i = 0; i < sets.size(); ++i) {
-      if (sets[i].id == set_id) state->parameters = sets[i];
+    for (const ParameterSetRecord& set : sets) {
+      if (set.id == set_id) state->parameters = set;
     }
     const Table<PatternRecord> patterns = bundle.patterns();
     for (std::uint32_t i = 0; i < patterns.size() && state->parameters.id == set_id; ++i) {

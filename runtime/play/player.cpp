@@ -52,8 +52,8 @@ std::string file_name(const std::string& path) {
 
 std::vector<std::string> pattern_names(const BundleView& bundle) {
   std::vector<std::string> names;
-  for (std::uint32_t i = 0; i < bundle.patterns().size(); ++i) {
-    names.emplace_back(bundle.name(bundle.patterns()[i].name));
+  for (const PatternRecord& pattern : bundle.patterns()) {
+    names.emplace_back(bundle.name(pattern.name));
   }
   return names;
 }
@@ -303,9 +303,7 @@ Result<void> Player::paint(const FrameReport& report) {
 Result<void> Player::write_picture(const FrameReport& report) {
   const Canvas canvas = screen_->canvas();
   const RgbaView picture{canvas.rgba, canvas.width, canvas.height};
-  for (const auto& sink : sinks_) {
-    MODAR_TRY(sink->picture(picture, report));
-  }
+  for (const auto& sink : sinks_) MODAR_TRY(sink->picture(picture, report));
   return {};
 }
 
@@ -316,9 +314,7 @@ Result<void> Player::write_line(const FrameReport& report, const Frame& frame) {
   }
   if (!options_.json && options_.report.empty() && !recorder_) return {};
   const std::string line = frame_line(report, names_, options_.homography);
-  for (const auto& sink : sinks_) {
-    MODAR_TRY(sink->line(report, line));
-  }
+  for (const auto& sink : sinks_) MODAR_TRY(sink->line(report, line));
   if (recorder_) {
     MODAR_TRY(recorder_->add(frame, line));
   }
@@ -418,9 +414,7 @@ Result<int> Player::finish(const PipelineCounts& counts) {
 /// Completes every output. whole: all frames were played, so that a comparison has a verdict.
 Result<void> Player::finish_outputs(bool whole) {
   const std::string summary = summary_line(stats_);
-  for (const auto& sink : sinks_) {
-    MODAR_TRY(sink->finish(summary));
-  }
+  for (const auto& sink : sinks_) MODAR_TRY(sink->finish(summary));
   if (recorder_) {
     MODAR_TRY(recorder_->finish());
   }

@@ -113,9 +113,9 @@ Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::
   }
   const std::string_view wanted = name.empty() ? std::string_view("orb-2000") : name;
   std::string known;
-  for (std::uint32_t i = 0; i < sets.size(); ++i) {
-    const std::string_view each = bundle.name(sets[i].name);
-    if (each == wanted) return sets[i].id;
+  for (const ParameterSetRecord& set : sets) {
+    const std::string_view each = bundle.name(set.name);
+    if (each == wanted) return set.id;
     if (!known.empty()) known += ", ";
     known += each;
   }
@@ -126,8 +126,8 @@ Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::
 
 ParameterSetRecord parameter_set(const BundleView& bundle, std::uint32_t id) {
   const Table<ParameterSetRecord> sets = bundle.parameter_sets();
-  for (std::uint32_t i = 0; i < sets.size(); ++i) {
-    if (sets[i].id == id) return sets[i];
+  for (const ParameterSetRecord& each : sets) {
+    if (each.id == id) return each;
   }
   return {};
 }

@@ -60,8 +60,8 @@ RoomLight light_of_record(const LightRecord& record) {
 }
 
 RoomLight scene_light(const BundleView& bundle, std::uint32_t scene) {
-  for (std::uint32_t i = 0; i < bundle.lights().size(); ++i) {
-    if (bundle.lights()[i].scene == scene) return light_of_record(bundle.lights()[i]);
+  for (const LightRecord& light : bundle.lights()) {
+    if (light.scene == scene) return light_of_record(light);
   }
   return neutral_room();
 }

@@ -102,14 +102,14 @@ ModelPainter::ModelPainter(const BundleView& bundle, std::span<const VertexForma
 
 /// Items of different models can share a draw call where their materials and layouts are equal.
 void ModelPainter::find_equals() {
-  for (std::uint32_t i = 0; i < bundle_.materials().size(); ++i) {
+  for (const MaterialRecord& material : bundle_.materials()) {
     std::uint32_t first = 0;
-    while (!equal_surface(bundle_.materials()[first], bundle_.materials()[i])) ++first;
+    while (!equal_surface(bundle_.materials()[first], material)) ++first;
     equal_material_.push_back(first);
   }
-  for (std::uint32_t i = 0; i < bundle_.layouts().size(); ++i) {
+  for (const LayoutRecord& layout : bundle_.layouts()) {
     std::uint32_t first = 0;
-    while (!equal_layout(bundle_.layouts()[first], bundle_.layouts()[i])) ++first;
+    while (!equal_layout(bundle_.layouts()[first], layout)) ++first;
     equal_layout_.push_back(first);
   }
 }
@@ -577,9 +577,7 @@ bool ModelPainter::draw_batch(const PaintJob& job, ProgramState& state,
     job.stats.triangles += piece.mesh.index_count / 3;
     job.stats.chunks_drawn += piece.chunks;
   }
-  for (const Piece& piece : pieces) {
-    ++find_mesh(parts_, piece.mesh)->copies;
-  }
+  for (const Piece& piece : pieces) ++find_mesh(parts_, piece.mesh)->copies;
   set_surface(job, state, pieces[0]);
   state.item = kNone;  // slot 0 is no single item's any more
   glUniform4fv(state.program.slots, static_cast<GLsizei>(slots_.size() * 4),

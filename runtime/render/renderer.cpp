@@ -360,8 +360,7 @@ struct Renderer::State {
   int keep_resident() {
     geometry.begin_frame();
     std::size_t kept = 0;
-    for (std::size_t i = 0; i < list.commands().size(); ++i) {
-      DrawCommand command = list.commands()[i];
+    for (DrawCommand command : list.commands()) {
       const ChunkRecord& chunk = bundle.chunks()[command.chunk];
       const std::uint32_t end = chunk.first_level + chunk.level_count;
       LevelPlace place;

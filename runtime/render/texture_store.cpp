@@ -59,8 +59,8 @@ TextureStore::TextureStore(const BundleView& bundle, const GlCaps& caps)
   colours_.assign(count, 0);
   alphas_.assign(count, 0);
   for (std::uint32_t i = 0; i < count; ++i) means_.push_back(mean_of(bundle, i));
-  for (std::uint32_t i = 0; i < bundle.materials().size(); ++i) {
-    const std::uint32_t texture = bundle.materials()[i].texture;
+  for (const MaterialRecord& material : bundle.materials()) {
+    const std::uint32_t texture = material.texture;
     if (texture != kNone) used_[texture] = true;
   }
   for (std::uint32_t i = 0; i < bundle.nodes().size(); ++i) {

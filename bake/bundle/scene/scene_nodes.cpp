@@ -407,8 +407,8 @@ BundleContent media_content(const BundleView& part) {
     content.textures.push_back(texture);
     content.texture_data.push_back(bytes(part.texture_data(i)));
   }
-  for (std::uint32_t i = 0; i < part.texture_levels().size(); ++i) {
-    content.texture_levels.push_back(part.texture_levels()[i]);
+  for (const TextureLevelRecord& level : part.texture_levels()) {
+    content.texture_levels.push_back(level);
   }
   return content;
 }

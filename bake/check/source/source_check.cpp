@@ -206,16 +206,15 @@ class SourceCheck {
     MODAR_ASSIGN(again_, BundleView::open(bytes));
     const auto unknown = [this](const auto& sources, const auto& assets) {
       return std::any_of(sources.begin(), sources.end(), [&](const auto& source) {
-        for (std::uint32_t i = 0; i < assets.size(); ++i) {
-          if (bundle_.name(assets[i].name) == source.name) return false;
+        for (const auto& each : assets) {
+          if (bundle_.name(each.name) == source.name) return false;
         }
         return true;
       });
     };
     strange_model_ = unknown(request.models, bundle_.models());
     strange_pattern_ = unknown(request.patterns, bundle_.patterns());
-    for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
-      const ModelRecord& model = bundle_.models()[m];
+    for (const ModelRecord& model : bundle_.models()) {
       const auto path =
           std::ranges::find(request.models, bundle_.name(model.name), &ModelRequest::name);
       if (path == request.models.end()) {
@@ -450,8 +449,7 @@ class SourceCheck {
 
   /// The sets that detection shares with the bake: of one name, they are one.
   void check_parameter_sets() {
-    for (std::uint32_t i = 0; i < bundle_.parameter_sets().size(); ++i) {
-      const ParameterSetRecord& set = bundle_.parameter_sets()[i];
+    for (const ParameterSetRecord& set : bundle_.parameter_sets()) {
       const ParameterSetRecord* other = namesake(again_.parameter_sets(), set.name);
       constexpr std::size_t kSize =
           offsetof(ParameterSetRecord, reserved) - offsetof(ParameterSetRecord, id);
@@ -634,8 +632,8 @@ class SourceCheck {
 
   static const LightRecord* light_of(const BundleView& bundle, std::uint32_t scene) {
     const Table<LightRecord> lights = bundle.lights();
-    for (std::uint32_t i = 0; i < lights.size(); ++i) {
-      if (lights[i].scene == scene) return &lights[i];
+    for (const LightRecord& light : lights) {
+      if (light.scene == scene) return &light;
     }
     return nullptr;
   }
@@ -801,8 +799,8 @@ class SourceCheck {
     if (which == kNone) return missing("pattern", pattern.name, &pattern, strange_pattern_);
     const PatternRecord& other = again_.patterns()[which];
     bool same = pattern.width == other.width && pattern.height == other.height;
-    for (std::uint32_t s = 0; s < again_.parameter_sets().size(); ++s) {
-      const std::uint32_t set = again_.parameter_sets()[s].id;
+    for (const ParameterSetRecord& each : again_.parameter_sets()) {
+      const std::uint32_t set = each.id;
       const auto features = again_.section(SectionType::kMappedFeatures, which, set);
       same = same && (features.empty() ||
                       equal(bundle_.section(SectionType::kMappedFeatures, index, set), features));
