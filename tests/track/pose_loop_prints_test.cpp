@@ -330,6 +330,33 @@ TEST(Prints, WhereMostIsCoveredNoneIsShownBesideItsPlace) {
   }
 }
 
+// Coarse levels, of which most is cover, drew right poses up to 140 pixels aside in the next frame.
+TEST(Prints, WhatIsHalfCoveredStaysWhereItWasFound) {
+  const Camera camera = default_camera(kWidth, kHeight);
+  SceneBand band;
+  band.area_low = 0.5;
+  band.area_high = 3.0;
+  band.covered_low = band.covered_high = 0.5;
+  int right = 0;
+  for (std::uint32_t seed = 1; seed <= 12; ++seed) {
+    Random random(seed);
+    const Pose pose = draw_pose(band, gray(picture()), camera, random);
+    SceneFrame scene = render_scene(gray(picture()), camera, pose,
+                                    clutter(kWidth, kHeight, 300 + seed % 8), band, random);
+    const auto loop = loop_on(alone());
+    for (int frame = 0; frame < 4; ++frame) {
+      TrackResult seen;
+      ASSERT_TRUE(loop->step(scene.picture.view(), seen));
+      for (const Detection& one : seen.visible) {
+        EXPECT_LT(worst_corner(one, scene), 5.0) << "seed " << seed << ", frame " << frame;
+      }
+      right += seen.visible.empty() ? 0 : 1;
+      expose(scene.picture, {}, random, scene.picture);
+    }
+  }
+  EXPECT_GE(right, 44);
+}
+
 TEST(Prints, APoseBesideThePatternHasSlippedUnlessSomethingCoversIt) {
   const auto pattern = tracker::view_tracked_pattern(record(), 0);
   ASSERT_TRUE(pattern) << to_line(pattern.error());
