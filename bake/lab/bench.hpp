@@ -29,6 +29,7 @@ struct PoseBenchRequest {
   std::string path;                     ///< replay this camera path instead; see bench_path()
   bool sift = false;                    ///< OpenCV's SIFT with MAGSAC beside the others
   bool known_camera = false;            ///< the tracker is told lens and aspect
+  int held = 1;                         ///< frames for which each view is held and tracked
   int many = 0;                         ///< measure bundles of 1 to so many patterns instead
   unsigned seed = 1;
   bool quiet = false;

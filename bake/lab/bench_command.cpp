@@ -70,6 +70,9 @@ void add_pose_options(CommandLine& line, PoseBenchRequest& pose) {
   line.flag("--sift", pose.sift, "Compare with OpenCV's SIFT and MAGSAC on the same frames");
   line.flag("--known-camera", pose.known_camera,
             "Give the tracker the lens and aspect (default: drawn at random and unknown to it)");
+  line.option("--held", &pose.held,
+              "Hold each view for N frames and track it; the last frame counts (default 1)",
+              {.type = "N", .least = 1, .most = 1000});
   line.option("--parameters", &pose.parameters,
               "Parameter set of the ModAR paper's method; none: leave it out");
   line.option("--only", &pose.only, "Bands or clips whose name contains this text");

@@ -107,6 +107,7 @@ Result<PoseBenchOptions> options_of(const PoseBenchRequest& command) {
   options.many = command.many;
   options.sift = command.sift;
   options.known_camera = command.known_camera;
+  options.held = command.held;
   MODAR_ASSIGN(options.paper_set, paper_set_named(command.parameters));
   for (const SceneBand& band : pose_bands()) {
     if (band.name.find(command.only) != std::string::npos) options.bands.push_back(band);

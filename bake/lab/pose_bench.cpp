@@ -160,6 +160,19 @@ UnknownView unknown_of(const PoseBenchOptions& options, std::size_t p, const Fix
   return draw_unknown(fixture.pictures[0].view(), camera, options.known_camera, random);
 }
 
+/// All frames but the last one of a view that is held.
+Result<void> hold(const PoseBenchOptions& options, Fixture& fixture, GrayPicture& picture,
+                  Random& random) {
+  if (options.held < 2 || !fixture.ours) return {};
+  const GrayPicture still = picture;
+  fixture.ours->reset();
+  for (int i = 1; i < options.held; ++i) {
+    MODAR_TRY(fixture.ours->step(picture.view()));
+    expose(still, {}, random, picture);
+  }
+  return {};
+}
+
 /// One path under one exposure, over one photo.
 Result<void> run_path(const PoseBenchOptions& options, std::size_t p, const GrayPicture& background,
                       const BenchPath& how, MethodTallies& tallies) {
@@ -267,7 +280,8 @@ Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& option
   std::vector<MethodTallies> tallies;
   for (const SceneBand& band : bands) tallies.emplace_back(band.name, false);
   for (std::size_t p = 0; p < options.patterns.size(); ++p) {
-    MODAR_ASSIGN(Fixture fixture, make_fixture({options.patterns[p]}, options, camera, false));
+    MODAR_ASSIGN(Fixture fixture,
+                 make_fixture({options.patterns[p]}, options, camera, options.held > 1));
     const UnknownView unknown = unknown_of(options, p, fixture, camera);
     const GrayImage picture = unknown.print.view();
     for (std::size_t b = 0; b < bands.size(); ++b) {
@@ -279,8 +293,8 @@ Result<std::vector<PoseBenchRow>> bench_detection(const PoseBenchOptions& option
         // Without a pattern only the photo makes the frames differ.
         const GrayPicture background = bands[b].pattern ? photo : another_view(photo, random);
         const Pose pose = draw_pose(bands[b], picture, unknown.lens, random);
-        const SceneFrame scene =
-            render_scene(picture, unknown.lens, pose, background, bands[b], random);
+        SceneFrame scene = render_scene(picture, unknown.lens, pose, background, bands[b], random);
+        MODAR_TRY(hold(options, fixture, scene.picture, random));
         MODAR_TRY(tallies[b].run(fixture, scene.picture.view(), {bands[b].pattern, scene.corners}));
       }
       if (progress) {

@@ -29,6 +29,9 @@ struct PoseBenchOptions {
   /// Frames are rendered through the camera that the tracker is given, and show the picture as it
   /// is; false: as draw_unknown() has them, and the tracker estimates the camera.
   bool known_camera = false;
+  /// bench_detection(): of ours, frames for which each view is held and tracked, each with noise of
+  /// its own; the last one counts. 1: single frames.
+  int held = 1;
   int many = 50;  ///< bench_many(): patterns in the greatest bundle, 2 or more
   std::uint64_t seed = 1;
   std::vector<SceneBand> bands;  ///< empty: pose_bands()
