@@ -178,7 +178,7 @@ Result<void> GeometryStore::expect() {
 Result<void> GeometryStore::expect_wanted() {
   if (rewrites_) return rewritten();
   copy_buffer_ = look_up_copy_buffer();
-  streams_ = true;
+  streams_ = arrives_ = true;
   // A level that is drawn until a finer one of the same chunks has come has half its triangles and
   // some of its vertices at most: both fit.
   list_budget_ = budget_ / 3 * 2;

@@ -72,6 +72,8 @@ class GeometryStore {
   [[nodiscard]] bool fits(std::span<const std::uint32_t> levels);
 
   [[nodiscard]] bool streams() const { return streams_; }
+  /// It streams what the bundle's bytes do not hold: others bring it as want() says.
+  [[nodiscard]] bool arrives() const { return arrives_; }
   [[nodiscard]] std::uint64_t resident_bytes() const { return resident_bytes_; }
   [[nodiscard]] std::uint64_t total_bytes() const { return vertex_total_ + index_total_; }
   [[nodiscard]] std::uint64_t uploaded_bytes() const { return uploaded_bytes_; }
@@ -143,6 +145,7 @@ class GeometryStore {
   GLuint whole_vertices_ = 0;
   GLuint whole_indices_ = 0;
   bool streams_ = false;
+  bool arrives_ = false;
   bool rewrites_ = false;
   bool client_arrays_ = false;
 };

@@ -25,14 +25,19 @@
 namespace modar {
 namespace {
 
-/// How often sixteen times the error is allowed on the screen where time or memory is short. Errors
+/// How often four times the error is allowed on the screen where time or memory is short. Errors
 /// count shading, which shows long before the form does: of a scan of a building, 50 m wide, a
 /// stand-in of 57,031 triangles states 250 m, where no stand-in is off by 2.6 m. 65,536 times is
-/// more than any states: only what does not fit the memory is left out.
-constexpr int kCoarser = 4;
-/// Halvings of such a step, in search of what fits, or is wanted next: 7 leave 2 % of error. Two
-/// stand-ins of a scan of 15.8 million triangles, of 61,522 and 15,380, state 7 % more or less.
-constexpr int kFiner = 7;
+/// more than any states.
+constexpr int kCoarser = 8;
+/// The same where what is drawn is brought at first: beyond it, what a view brings on its way is
+/// more than all that it needs (tests/web/wanted_test.py, behind a slow host).
+constexpr int kCoarserBrought = 5;
+/// Halvings of such a step in search of what fits: 6 leave 2 % of error. Two stand-ins of a scan of
+/// 15.8 million triangles, of 61,522 and 15,380, state 7 % more or less.
+constexpr int kFiner = 6;
+/// The same of what is wanted next: 9 %.
+constexpr int kFinerNext = 4;
 /// How much wider and higher than the picture what is asked for before it is seen is: trades bytes
 /// that may never be seen for turns that find nothing missing. `tests/bench/huge_page.py --pan
 /// --max-bytes 16e6` over a scan of 4.5 million triangles falls to a stand-in 3 times with 1, never
@@ -258,13 +263,14 @@ struct Renderer::State {
       list.build(bundle, painter.setups(), projection, height, items, some);
       return list_fits();
     };
-    int step = coarser ? 0 : kCoarser + 1;
-    for (; !fits(pixels) && step <= kCoarser; ++step) {
-      pixels = step < kCoarser || !geometry.streams() ? 16.0f * pixels : options.lod_pixels;
+    const int most = geometry.arrives() ? kCoarserBrought : kCoarser;
+    int step = coarser ? 0 : most + 1;
+    for (; !fits(pixels) && step <= most; ++step) {
+      pixels = step < most || !geometry.streams() ? 4.0f * pixels : options.lod_pixels;
     }
-    if (step > 0 && step <= kCoarser) {
+    if (step > 0 && step <= most) {
       // The finest of that step which fits: stand-ins of one model often lie in one.
-      float factor = 4.0f;
+      float factor = 2.0f;
       for (int i = 0; i < kFiner; ++i, factor = std::sqrt(factor)) {
         if (fits(pixels / factor)) pixels /= factor;
       }
@@ -293,13 +299,13 @@ struct Renderer::State {
     };
     float coarse = 0.0f;
     float fine = pixels;
-    for (int i = kCoarser; i >= 0; --i) {
-      fine = std::ldexp(pixels, 4 * i);
+    for (int i = kCoarserBrought; i >= 0; --i) {
+      fine = std::ldexp(pixels, 2 * i);
       if (lacks(fine)) break;
       coarse = fine;
     }
     // The coarsest of that step: stand-ins of one model often lie in one.
-    for (int i = 0; coarse > 0.0f && i < kFiner; ++i) {
+    for (int i = 0; coarse > 0.0f && i < kFinerNext; ++i) {
       const float middle = std::sqrt(coarse * fine);
       (lacks(middle) ? fine : coarse) = middle;
     }
