@@ -12,9 +12,9 @@ namespace {
 // other starts are tried. Higher costs time under every passing hand; 0.375 to 0.9 change no pose
 // of `modar-lab bench wild`, 1.05 (every frame) worsens the 95th percentile.
 constexpr double kSuspicious = 0.75;
-// Share of a coarser level's inlier ratio with which a sharp fit on a finer one stays. Swept on 70
-// % covered, held for 3 frames with fresh noise: 88.9, 87.5, 80.6 and 75.0 % right
-// with 0, 0.6, 0.8 and 1, half covered 100, 100, 97.2 and 95.8 %.
+// Share of a coarser level's inlier ratio with which a sharp fit on a finer one stays: higher lets
+// what covers a print draw it away. Swept on prints covered to 70 %, held for 3 frames: 88.9, 87.5,
+// 80.6 and 75.0 % right with 0, 0.6, 0.8 and 1; half covered 100, 100, 97.2 and 95.8 %.
 constexpr double kSharpShare = 0.6;
 // And under which the pose is not shown: blur and a jerk had put it 37 to 74 pixels beside, at 0.34
 // to 0.48 of that ratio. After so many such frames it is lost: a search tells whether something
