@@ -3,7 +3,7 @@
 
 Its walls have windows, courses of stone and tiled roofs in relief, its vertices have colours. Each part
 is a surface of rings, open below, so that the counts come out exactly: a part of S points a ring
-adds 2 V - F = S + 2, and what is then missing is made up by splitting faces and border edges.
+adds 2 V - F = S + 2, and the missing ones are made by splitting faces and border edges.
 Nothing but one ring of a part is held in memory. The same bytes each time.
 """
 import argparse
@@ -87,7 +87,7 @@ def footprint(part, u):
 
 
 def window(part, along, z):
-    """How deep in a window a point of the wall lies: (depth in metres, is glass)."""
+    """The depth of a wall's point in a window: (depth in metres, is glass)."""
     spacing, sill, head, wide = part[8:12]
     half = part[3 if abs(along) <= part[3] / 2 else 2] / 2
     if part[7] != "round" and half - abs(along) < wide:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Renders a clip of a pattern held before a camera, as PNG frames with the true corners beside them.
+"""Renders a clip of a pattern held before a camera, as PNG frames with the true corners next to them.
 
 The camera's focal length is the image's width, its centre the image's middle. The hand sways, tilts,
 turns and comes nearer; the light changes; a hand covers a part for a while; in about an eighth of the

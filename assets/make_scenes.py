@@ -3,7 +3,7 @@
 what they are.
 
 Pictures, models, films and tunes are made here; FFmpeg encodes the film and, where the program espeak-ng is there, it speaks
-the painting's words: a tune of as many syllables stands for them otherwise. The same bytes each time, of one FFmpeg.
+the painting's words: a tune of as many syllables replaces them otherwise. The same bytes each time, of one FFmpeg.
 """
 import argparse
 import array
@@ -21,7 +21,7 @@ from kit import png  # noqa: E402
 from kit.canvas import Canvas, mix, ring, star  # noqa: E402
 
 RATE = 22050  # samples a second
-BAKE = "[bake]\nparameters = [\"none\"]\n"
+BAKE = "[bake]\nparameters = \"none\"\n"
 
 WORDS = {
     "en": ("In nineteen twenty-two this painting hung above a kitchen stove.",
@@ -32,7 +32,7 @@ WORDS = {
 PAINTING = BAKE + """
 [[pattern]]
 file = "painting.png"
-width-mm = 200
+width = "200mm"
 [[scene]]
 pattern = "painting"
 text.en = "A painting that speaks. Touch 1 to hear its restorer."
@@ -72,7 +72,7 @@ do = "show window"
 POSTER = BAKE + """
 [[pattern]]
 file = "poster.png"
-width-mm = 300
+width = "300mm"
 [[scene]]
 pattern = "poster"
 text.en = "A poster that plays. Touch the film to pause it, the star for tickets."
@@ -117,7 +117,7 @@ file = "engine.obj"
 file = "wheel.obj"
 [[pattern]]
 file = "drawing.png"
-width-mm = 160
+width = "160mm"
 [[scene]]
 pattern = "drawing"
 model = "engine"

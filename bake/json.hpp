@@ -60,9 +60,9 @@ class Json {
   [[nodiscard]] std::size_t size() const;
   /// Of an object's members; empty for anything else.
   [[nodiscard]] std::vector<std::string> keys() const;
-  /// An element of an array. Nothing: there is none, or this is no array.
+  /// An element of an array. Nothing: it is absent, or this is no array.
   [[nodiscard]] std::optional<Json> at(std::size_t index) const;
-  /// A member of an object; "a/b" is b of a. Nothing: there is none.
+  /// A member of an object; "a/b" is b of a. Nothing: it is absent.
   [[nodiscard]] std::optional<Json> find(std::string_view path) const;
   /// Nothing where this is of another type; a count is a number without sign or fraction.
   [[nodiscard]] std::optional<double> number() const;
@@ -97,7 +97,7 @@ class Json {
   Json(Number, std::int64_t number);
   Json(Number, std::uint64_t number);
 
-  std::unique_ptr<Value> value_;  ///< never empty but in what was moved from
+  std::unique_ptr<Value> value_;  ///< never empty, except after a move
 };
 
 }  // namespace modar

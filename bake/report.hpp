@@ -18,7 +18,7 @@ using ProgressCallback = std::function<void(const std::string& stage, double don
 
 enum class DiagnosticSeverity : std::uint8_t { kInfo, kWarning, kError };
 
-/// Something in the input that a person may want to know or mend; the bake goes on.
+/// Something in the input that a person may want to know or repair; the bake continues.
 struct Diagnostic {
   std::string id;  ///< stable, "obj.missing-mtl"
   DiagnosticSeverity severity = DiagnosticSeverity::kWarning;
@@ -41,7 +41,7 @@ struct StageReport {
 /// A half-edge mesh, as OpenMesh builds it.
 struct HalfEdgeCount {
   std::uint64_t boundary_loops = 0;  ///< where fans touch, a walk goes from one to the next
-  std::uint64_t copied_faces = 0;  ///< that it refused, and that stand on copies of their vertices
+  std::uint64_t copied_faces = 0;    ///< that it refused, and that use copies of their vertices
   std::uint64_t copied_vertices = 0;
 };
 
@@ -78,8 +78,8 @@ struct LevelFigures {
 struct Report {
   std::vector<StageReport> stages;
   std::vector<Diagnostic> diagnostics;
-  std::vector<MeshTopology> topologies;  ///< one a model, where they were asked for
-  std::vector<LevelFigures> levels;      ///< one a model, where levels were asked for
+  std::vector<MeshTopology> topologies;  ///< one a model, where requested
+  std::vector<LevelFigures> levels;      ///< one a model, where levels were requested
   std::vector<Upright> uprights;         ///< one a model
   ProgressCallback progress;             ///< may be empty
 };

@@ -34,7 +34,7 @@ enum class UpReason : std::uint8_t {
   kHeader,         ///< a comment of the file says it
   kGeoreferenced,  ///< map coordinates: two axes are far from the origin, the third is the height
   kGround,         ///< open ground, seen from above
-  kBase,           ///< tall, and only one end is a base to stand on
+  kBase,           ///< tall, and only one end is a base
   kConvention      ///< nothing says it: what most files of the format have
 };
 
@@ -51,7 +51,7 @@ constexpr std::string_view up_reason_words(UpReason reason) {
                                          "the file's header",
                                          "map coordinates",
                                          "geometry: open ground",
-                                         "geometry: a base to stand on",
+                                         "geometry: a base",
                                          "the convention of its format"};
   return kWords[static_cast<std::size_t>(reason)];
 }

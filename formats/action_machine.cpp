@@ -125,7 +125,7 @@ bool ActionMachine::named(const ActionRecord& action, std::uint32_t material) co
          bundle_.name(bundle_.materials()[material].name) == bundle_.name(action.part);
 }
 
-/// Each action once a step, in the order of the table: none can bring about another.
+/// Each action once a step, in the order of the table: none can cause another.
 void ActionMachine::fire(ActionEvent event, std::uint32_t source, std::uint32_t material) {
   for (std::uint32_t i = 0; i < fired_.size(); ++i) {
     const ActionRecord& action = bundle_.actions()[i];

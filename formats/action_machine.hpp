@@ -1,5 +1,5 @@
-// Runs a bundle's actions: what was seen and tapped in, what the nodes look like and what the app
-// has to do out. *Nodes and actions* of bundle.md specifies it.
+// Runs a bundle's actions: detections and taps in, the nodes' looks and the app's commands out.
+// *Nodes and actions* of bundle.md specifies it.
 #pragma once
 
 #include <cstddef>
@@ -24,10 +24,10 @@ struct SceneEvent {
   };
   Kind kind = Kind::kSeen;
   std::uint32_t subject = 0;       ///< index of the pattern, or of the node
-  std::uint32_t material = kNone;  ///< of a tap on a model: the one that lies there, absolute
+  std::uint32_t material = kNone;  ///< of a tap on a model: the one that is there, absolute
 };
 
-/// What the app has to do; the nodes' own state is asked with shown() and turn_of().
+/// What the app has to do; shown() and turn_of() return the nodes' own state.
 struct SceneCommand {
   ActionCommand command = ActionCommand::kText;  ///< kPlay, kPause, kText or kLink
   std::uint32_t node = kNone;                    ///< the video or sound, the label
@@ -66,13 +66,13 @@ class ActionMachine {
  private:
   struct Pattern {
     bool present = false;
-    double seen = 0;   ///< time of the last sighting
+    double seen = 0;   ///< time of the last detection
     double since = 0;  ///< time at which it was found
   };
   struct Node {
     bool shown = true;
     bool wanted = false;         ///< a video or sound is to play while its pattern is there
-    bool playing = false;        ///< as the app was told
+    bool playing = false;        ///< as reported to the app
     bool told = false;           ///< its words, in this step
     NodeTurn base;               ///< where its last turn began
     double start = 0;            ///< of that turn, seconds

@@ -9,7 +9,7 @@
 namespace modar {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "records are read where they lie");
+static_assert(std::endian::native == std::endian::little, "records are read in place");
 
 std::string_view text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};

@@ -52,7 +52,7 @@ class Table {
     more_count_ = more.count_;
     more_stride_ = more.stride_;
   }
-  /// Without what was appended.
+  /// Without appended parts.
   [[nodiscard]] Table own() const { return {first_, count_, stride_}; }
 
  private:
@@ -72,7 +72,7 @@ inline std::uint32_t occlusion_byte(const Table<OcclusionRecord>& records, std::
   return kNone;
 }
 
-/// Chunks that are drawn together: those of a model, or those of one of its stand-ins.
+/// Chunks that are drawn together: those of a model, or those of one of its proxies.
 struct ChunkGroup {
   std::uint32_t model = 0;
   std::uint32_t first_chunk = 0;
@@ -94,9 +94,9 @@ struct BundleParts {
   std::span<const std::byte> vertices;
   std::span<const std::byte> indices;
   Table<ModelRecord> models;
-  Table<ChunkRecord> chunks;  ///< of models, then of stand-ins; levels alike
+  Table<ChunkRecord> chunks;  ///< of models, then of proxies; levels alike
   Table<LevelRecord> levels;
-  Table<StandInRecord> stand_ins;
+  Table<ProxyRecord> proxies;
   Table<MaterialRecord> materials;
   Table<LayoutRecord> layouts;
   Table<TextureRecord> textures;
@@ -110,14 +110,14 @@ struct BundleParts {
   Table<ActionRecord> actions;
   Table<MediaRecord> media;
 
-  /// Groups in the order of their chunks, which follow each other: all models, then all stand-ins.
-  [[nodiscard]] std::uint32_t chunk_groups() const { return models.size() + stand_ins.size(); }
+  /// Groups in the order of their chunks, which follow each other: all models, then all proxies.
+  [[nodiscard]] std::uint32_t chunk_groups() const { return models.size() + proxies.size(); }
   [[nodiscard]] ChunkGroup chunk_group(std::uint32_t index) const {
     if (index < models.size()) {
       return {index, models[index].first_chunk, models[index].chunk_count};
     }
-    const StandInRecord& stand_in = stand_ins[index - models.size()];
-    return {stand_in.model, stand_in.first_chunk, stand_in.chunk_count};
+    const ProxyRecord& proxy = proxies[index - models.size()];
+    return {proxy.model, proxy.first_chunk, proxy.chunk_count};
   }
 };
 
@@ -134,22 +134,23 @@ class BundleView {
   static Result<BundleView> open(std::span<const std::byte> bytes);
 
   [[nodiscard]] std::span<const std::byte> bytes() const { return parts_.bytes; }
+  [[nodiscard]] const BundleParts& parts() const { return parts_; }
   [[nodiscard]] const FileHeader& header() const {
     return *reinterpret_cast<const FileHeader*>(parts_.bytes.data());
   }
   [[nodiscard]] std::span<const SectionEntry> sections() const { return parts_.sections; }
-  /// The bytes of a section, empty if there is none. O(log sections).
+  /// The bytes of a section, empty if absent. O(log sections).
   [[nodiscard]] std::span<const std::byte> section(SectionType type, std::uint32_t owner = kNone,
                                                    std::uint32_t variant = 0) const;
 
   [[nodiscard]] std::string_view name(NameRef ref) const;
   [[nodiscard]] std::string_view meta() const;
   [[nodiscard]] Table<ModelRecord> models() const { return parts_.models; }
-  /// Of models, and behind them, from chunks().own().size() on, of stand-ins. Levels alike.
+  /// Of models, and behind them, from chunks().own().size() on, of proxies. Levels alike.
   [[nodiscard]] Table<ChunkRecord> chunks() const { return parts_.chunks; }
   [[nodiscard]] Table<LevelRecord> levels() const { return parts_.levels; }
   /// Sorted by model, those of one model from fine to coarse.
-  [[nodiscard]] Table<StandInRecord> stand_ins() const { return parts_.stand_ins; }
+  [[nodiscard]] Table<ProxyRecord> proxies() const { return parts_.proxies; }
   [[nodiscard]] std::uint32_t chunk_groups() const { return parts_.chunk_groups(); }
   [[nodiscard]] ChunkGroup chunk_group(std::uint32_t index) const {
     return parts_.chunk_group(index);

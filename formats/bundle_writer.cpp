@@ -22,7 +22,7 @@
 namespace modar {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "records are written as they lie");
+static_assert(std::endian::native == std::endian::little, "records are written from memory");
 
 using Bytes = std::span<const std::byte>;
 constexpr std::array<std::byte, kGpuAlignment> kZeros{};
@@ -78,19 +78,19 @@ class SectionList {
     add(type, kNone, 0, {bytes_of(table_headers_.back()), std::as_bytes(std::span(records))});
   }
 
-  /// Numbers chunks and levels of stand-ins behind those of models.
-  void add_stand_ins(const BundleContent& content) {
-    stand_ins_ = content.stand_ins;
-    stand_in_chunks_ = content.stand_in_chunks;
-    for (StandInRecord& stand_in : stand_ins_) {
-      stand_in.first_chunk += static_cast<std::uint32_t>(content.chunks.size());
+  /// Numbers chunks and levels of proxies behind those of models.
+  void add_proxies(const BundleContent& content) {
+    proxies_ = content.proxies;
+    proxy_chunks_ = content.proxy_chunks;
+    for (ProxyRecord& proxy : proxies_) {
+      proxy.first_chunk += static_cast<std::uint32_t>(content.chunks.size());
     }
-    for (ChunkRecord& chunk : stand_in_chunks_) {
+    for (ChunkRecord& chunk : proxy_chunks_) {
       chunk.first_level += static_cast<std::uint32_t>(content.levels.size());
     }
-    add_table(SectionType::kStandIns, stand_ins_);
-    add_table(SectionType::kStandInChunks, stand_in_chunks_);
-    add_table(SectionType::kStandInLevels, content.stand_in_levels);
+    add_table(SectionType::kProxies, proxies_);
+    add_table(SectionType::kProxyChunks, proxy_chunks_);
+    add_table(SectionType::kProxyLevels, content.proxy_levels);
   }
 
   void add_features(std::uint32_t pattern, const FeatureContent& features) {
@@ -171,8 +171,8 @@ class SectionList {
   std::vector<Section> sections_;
   std::vector<TableHeader> table_headers_;
   std::vector<FeatureHeader> feature_headers_;
-  std::vector<StandInRecord> stand_ins_;
-  std::vector<ChunkRecord> stand_in_chunks_;
+  std::vector<ProxyRecord> proxies_;
+  std::vector<ChunkRecord> proxy_chunks_;
   std::uint64_t file_size_ = 0;
 };
 
@@ -209,7 +209,7 @@ void collect(const BundleContent& content, SectionList& list) {
   list.add_table(SectionType::kNodes, content.nodes);
   list.add_table(SectionType::kActions, content.actions);
   list.add_table(SectionType::kMedia, content.media);
-  list.add_stand_ins(content);
+  list.add_proxies(content);
   for (std::uint32_t pattern = 0; pattern < content.features.size(); ++pattern) {
     for (const FeatureContent& features : content.features[pattern]) {
       list.add_features(pattern, features);
@@ -291,7 +291,7 @@ std::uint16_t minor_version_of(const BundleContent& content) {
   if (!content.nodes.empty()) need_section(SectionType::kNodes);
   if (!content.actions.empty()) need_section(SectionType::kActions);
   if (!content.media.empty()) need_section(SectionType::kMedia);
-  if (!content.stand_ins.empty()) need_section(SectionType::kStandIns);
+  if (!content.proxies.empty()) need_section(SectionType::kProxies);
   return minor;
 }
 

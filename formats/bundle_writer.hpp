@@ -24,7 +24,7 @@ struct FeatureContent {
   std::string yml;                     ///< OpenCV FileStorage text of the same
 };
 
-/// A section that the writer does not know: carried as it is.
+/// A section that the writer does not know: carried unchanged.
 struct ExtraSection {
   std::uint32_t type = 0;
   std::uint16_t version = 1;
@@ -56,11 +56,11 @@ struct BundleContent {
   std::vector<NodeRecord> nodes;
   std::vector<ActionRecord> actions;
   std::vector<MediaRecord> media;
-  /// Their first_chunk counts in stand_in_chunks, first_level of these in stand_in_levels: the
+  /// Their first_chunk counts in proxy_chunks, first_level of these in proxy_levels: the
   /// writer adds the number of chunks and levels of models, which is known last.
-  std::vector<StandInRecord> stand_ins;
-  std::vector<ChunkRecord> stand_in_chunks;
-  std::vector<LevelRecord> stand_in_levels;
+  std::vector<ProxyRecord> proxies;
+  std::vector<ChunkRecord> proxy_chunks;
+  std::vector<LevelRecord> proxy_levels;
   std::vector<std::vector<FeatureContent>> features;  ///< one list a pattern
   std::vector<std::byte> vertices;
   std::vector<std::byte> indices;
@@ -89,7 +89,7 @@ Result<void> write_bundle(const BundleContent& content, const ByteSink& sink);
 /// The same into memory.
 Result<std::vector<std::byte>> encode_bundle(const BundleContent& content);
 
-/// The same into a file: written beside `path`, synced, renamed over it.
+/// The same into a file: written next to `path`, synced, renamed over it.
 Result<void> save_bundle(const BundleContent& content, const std::string& path);
 
 }  // namespace modar

@@ -32,7 +32,7 @@ class Lines {
 };
 
 /// `digits` decimal digits from the front of the text; -1 where they are not there.
-std::int64_t take_number(std::string_view& text, std::size_t digits) {
+std::int64_t parse_number(std::string_view& text, std::size_t digits) {
   if (text.size() < digits) return -1;
   std::int64_t number = 0;
   for (std::size_t i = 0; i < digits; ++i) {
@@ -49,26 +49,26 @@ bool take(std::string_view& text, std::string_view part) {
   return true;
 }
 
-/// [HH:]MM:SS.mmm in milliseconds; -1: there is none.
-std::int64_t take_time(std::string_view& text) {
+/// [HH:]MM:SS.mmm in milliseconds; -1: none exists.
+std::int64_t parse_time(std::string_view& text) {
   const bool hours = text.size() > 5 && text[2] == ':' && text[5] == ':';
-  const std::int64_t hour = hours ? take_number(text, 2) : 0;
+  const std::int64_t hour = hours ? parse_number(text, 2) : 0;
   if (hour < 0 || (hours && !take(text, ":"))) return -1;
-  const std::int64_t minute = take_number(text, 2);
+  const std::int64_t minute = parse_number(text, 2);
   if (minute < 0 || minute > 59 || !take(text, ":")) return -1;
-  const std::int64_t second = take_number(text, 2);
+  const std::int64_t second = parse_number(text, 2);
   if (second < 0 || second > 59 || !take(text, ".")) return -1;
-  const std::int64_t rest = take_number(text, 3);
+  const std::int64_t rest = parse_number(text, 3);
   return rest < 0 ? -1 : ((hour * 60 + minute) * 60 + second) * 1000 + rest;
 }
 
 /// A line with the times of a cue, which begins no earlier than the one before.
 const char* check_times(std::string_view line, std::int64_t& last) {
-  const std::int64_t begin = take_time(line);
+  const std::int64_t begin = parse_time(line);
   if (begin < 0 || !take(line, " ") || !take(line, kArrow) || !take(line, " ")) {
     return "it is not a line of times like 00:01.500 --> 00:04.000";
   }
-  const std::int64_t end = take_time(line);
+  const std::int64_t end = parse_time(line);
   if (end < 0 || !(line.empty() || line[0] == ' ')) return "its second time is not a time";
   if (end <= begin) return "its end is not after its beginning";
   if (begin < last) return "it begins before the cue above";
@@ -103,7 +103,7 @@ void add_plain(std::string_view line, std::string& text) {
   }
 }
 
-/// The words of the cues that `wanted` says yes to, given their times in milliseconds.
+/// Concatenates the text of all cues accepted by the predicate (start_ms, end_ms).
 template <class Wanted>
 std::string words_of(std::string_view captions, char between_lines, const Wanted& wanted) {
   Lines lines(captions);
@@ -113,9 +113,9 @@ std::string words_of(std::string_view captions, char between_lines, const Wanted
     lines.next();
     if (lines.at_end()) break;
     std::string_view times = lines.next();
-    const std::int64_t begin = take_time(times);
+    const std::int64_t begin = parse_time(times);
     times.remove_prefix(std::min(times.size(), kArrow.size() + 2));
-    const bool shown = wanted(begin, take_time(times));
+    const bool shown = wanted(begin, parse_time(times));
     char before = '\n';
     while (!lines.at_end()) {
       Lines ahead = lines;

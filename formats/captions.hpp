@@ -1,5 +1,5 @@
-// Captions: what is heard, as text with times. The part of WebVTT (W3C) that bundles have, which
-// browsers read as it is.
+// Captions: speech and sound as text with times. The part of WebVTT (W3C) that bundles have, which
+// browsers read unchanged.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace modar {
 
-/// Of one language of one node. An hour of speech, 9,000 words in 900 cues, takes 85,000 bytes.
+/// Bytes of one language of one node, more than an hour of speech.
 inline constexpr std::size_t kMostCaptionBytes = std::size_t{1} << 18;
 
 /// Where captions break their grammar, and how.
@@ -21,7 +21,7 @@ struct CaptionFault {
 /// Holds a text against *Captions* of bundle.md. Nothing: it keeps the rules. Allocates nothing.
 std::optional<CaptionFault> check_captions(std::string_view text);
 
-/// What is heard at a time of a text that keeps the rules: the lines of each cue of then, without
+/// The cues at a time of a text that keeps the rules: the lines of each cue of then, without
 /// markup; empty between cues.
 std::string words_at(std::string_view captions, double seconds);
 /// All that is heard, a line a cue, without times and markup.

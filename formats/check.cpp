@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstring>
 #include <limits>
+#include <vector>
 
 #include "formats/base/bits.hpp"
 #include "formats/check_rules.hpp"
@@ -74,7 +75,7 @@ void SectionHash::read_to(std::uint64_t end) {
 void SectionHash::finish() {
   if (entry_ == nullptr) return;
   read_to(entry_->size);
-  // Small sections stay: what is checked next reads them.
+  // Small sections stay: the next checks read them.
   if (released_ > 0) release(true);
   if (XXH64_digest(&state_->xxh) == entry_->hash) return;
   log_.add(Rule::kSectionHash, entry_->offset,
@@ -83,7 +84,7 @@ void SectionHash::finish() {
                std::to_string(entry_->type) + " differs from the stated one");
 }
 
-/// Gives back whole pages; the last one may hold the start of what is read next.
+/// Gives back whole pages; the last one may hold the start of the next range.
 void SectionHash::release(bool all) {
   const std::uint64_t end = all ? hashed_ : hashed_ / kGpuAlignment * kGpuAlignment;
   if (options_.release && end > released_) {
@@ -146,8 +147,8 @@ void check_counts(FaultLog& log, const BundleParts& parts, const ModelRecord& mo
   }
 }
 
-/// The diagonal of the box of all chunks, and how much of it may be errors: packed positions lie up
-/// to one beside the source's, coarser levels up to theirs beside level 0. Both in source units.
+/// The diagonal of the box of all chunks, and how much of it may be errors: packed positions are up
+/// to one off the source's, coarser levels up to theirs off level 0. Both in source units.
 std::pair<double, double> decoded_diagonal(const BundleParts& parts, const ModelRecord& model) {
   constexpr double kFar = std::numeric_limits<double>::infinity();
   std::array<double, 3> low = {kFar, kFar, kFar};
@@ -232,7 +233,7 @@ bool has_integer_positions(const LayoutRecord& layout) {
   return false;
 }
 
-/// Does a chunk stand on the grid that the first chunk of its group has?
+/// Is a chunk on the grid of the first chunk of its group?
 void check_grid(FaultLog& log, const BundleParts& parts, const ChunkGroup& group,
                 const ChunkRecord& chunk, const std::string& where) {
   if (!has_integer_positions(parts.layouts[parts.models[group.model].layout])) return;
@@ -283,7 +284,7 @@ void check_material(FaultLog& log, const BundleParts& parts, const MaterialRecor
               number_text(wide(material.opacity)) + " is not from 0 to 1");
 }
 
-/// Looks for the first byte of a buffer that no range of a level covers. Levels mostly lie in
+/// Looks for the first byte of a buffer that no range of a level covers. Levels are mostly in
 /// order, so that few passes over the table do; after that it gives the buffer the benefit of the
 /// doubt.
 template <class RangeOf>
@@ -308,11 +309,11 @@ void check_referenced(FaultLog& log, const BundleParts& parts, Rule rule,
   }
 }
 
-/// Strides by level would need a table; levels of a model lie together, so a cursor does.
+/// Strides by level would need a table; levels of a model are adjacent, so a cursor suffices.
 class StrideCursor {
  public:
   explicit StrideCursor(const BundleParts& parts) : parts_(parts) {}
-  /// Levels are asked for in rising order, then from 0 again.
+  /// Levels are requested in rising order, then from 0 again.
   std::uint32_t operator()(std::uint32_t level) {
     if (level == 0) group_ = end_ = 0;
     while (level >= end_ && group_ < parts_.chunk_groups()) {
@@ -333,7 +334,7 @@ class StrideCursor {
 };
 
 /// From fine to coarse.
-void check_stand_in_order(FaultLog& log, const BundleParts& parts, std::uint32_t group) {
+void check_proxy_order(FaultLog& log, const BundleParts& parts, std::uint32_t group) {
   const ChunkGroup finer = parts.chunk_group(group - 1);
   const ChunkGroup coarser = parts.chunk_group(group);
   if (finer.model != coarser.model) return;
@@ -370,7 +371,7 @@ void check_model_records(FaultLog& log, const BundleParts& parts) {
       check_grid(log, parts, group, chunk, where);
       if (i < parts.models.size()) check_levels(log, parts, chunk, where);
     }
-    if (i > parts.models.size()) check_stand_in_order(log, parts, i);
+    if (i > parts.models.size()) check_proxy_order(log, parts, i);
   }
   StrideCursor stride(parts);
   check_referenced(log, parts, Rule::kUnreferencedVertices, parts.vertices, [&](std::uint32_t i) {
@@ -547,7 +548,21 @@ void check_tracker_record(FaultLog& log, const BundleParts& parts, const Pattern
   }
 }
 
-/// The twins of a pattern lie side by side in the section table.
+/// Only its frame: a RIFF file states its size in bytes 4 to 7, without the first eight.
+void check_picture(FaultLog& log, const BundleParts& parts, const PatternRecord& pattern,
+                   const SectionEntry& entry) {
+  const std::span<const std::byte> bytes = section_bytes(parts, entry);
+  std::uint32_t size = 0;
+  const bool framed = bytes.size() > 12 && std::memcmp(bytes.data(), "RIFF", 4) == 0 &&
+                      std::memcmp(bytes.data() + 8, "WEBP", 4) == 0;
+  if (framed) std::memcpy(&size, bytes.data() + 4, sizeof size);
+  if (framed && bytes.size() <= kMaxPatternPicture && bytes.size() == std::size_t{size} + 8) return;
+  log.add(
+      Rule::kPattern, entry.offset, label(parts, "pattern", pattern.name),
+      "its picture is not a WebP file of at most " + std::to_string(kMaxPatternPicture) + " bytes");
+}
+
+/// The twins of a pattern are adjacent in the section table.
 void check_findable(FaultLog& log, const BundleParts& parts, std::uint32_t index) {
   if (find_section(parts.sections, SectionType::kTrackerRecord, index, 0) != nullptr) return;
   constexpr auto kTwin = static_cast<std::uint32_t>(SectionType::kMappedFeatures);
@@ -576,6 +591,9 @@ void check_patterns(FaultLog& log, const BundleParts& parts) {
     const auto type = static_cast<SectionType>(entry.type);
     if (type == SectionType::kTrackerRecord) {
       check_tracker_record(log, parts, parts.patterns[entry.owner], entry);
+    }
+    if (type == SectionType::kPatternPicture) {
+      check_picture(log, parts, parts.patterns[entry.owner], entry);
     }
     if (type != SectionType::kMappedFeatures && type != SectionType::kFeatureYml) continue;
     const PatternRecord& pattern = parts.patterns[entry.owner];
@@ -642,6 +660,29 @@ void check_minor(FaultLog& log, const BundleParts& parts, bool accept_newer) {
   }
 }
 
+/// Models that no scene shows, and patterns on which nothing stands, where there are both.
+void check_shown(FaultLog& log, const BundleParts& parts) {
+  if (parts.models.empty() || parts.patterns.empty()) return;
+  std::vector<bool> models(parts.models.size());
+  std::vector<bool> patterns(parts.patterns.size());
+  for (const SceneRecord& scene : parts.scenes) {
+    models[scene.model] = patterns[scene.pattern] = true;
+  }
+  for (const NodeRecord& node : parts.nodes) patterns[node.pattern] = true;
+  for (std::uint32_t i = 0; i < models.size(); ++i) {
+    const ModelRecord& model = parts.models[i];
+    if (models[i]) continue;
+    log.add(Rule::kNeverShown, offset_of(parts, &model), label(parts, "model", model.name),
+            "no pattern shows it");
+  }
+  for (std::uint32_t i = 0; i < patterns.size(); ++i) {
+    const PatternRecord& pattern = parts.patterns[i];
+    if (patterns[i]) continue;
+    log.add(Rule::kNeverShown, offset_of(parts, &pattern), label(parts, "pattern", pattern.name),
+            "nothing is on it");
+  }
+}
+
 /// Everything but sections as bytes.
 void check_contents(FaultLog& log, BundleParts& parts, BufferHashes& hashes, bool accept_newer) {
   const std::uint64_t damaged = log.errors();
@@ -659,9 +700,15 @@ void check_contents(FaultLog& log, BundleParts& parts, BufferHashes& hashes, boo
   check_draw_orders(log, parts);
   check_node_texts(log, parts);
   check_media_files(log, parts);
+  check_shown(log, parts);
 }
 
 }  // namespace
+
+void check_shown(const BundleView& bundle, const IssueSink& sink) {
+  FaultLog log(sink);
+  check_shown(log, bundle.parts());
+}
 
 bool check_bundle(std::span<const std::byte> bytes, const IssueSink& sink,
                   const CheckOptions& options) {

@@ -22,7 +22,7 @@ enum class Severity : std::uint8_t { kError, kWarning, kInfo };
 struct IssueKind {
   const char* id;  ///< stable: "BUNDLE_TRUNCATED"
   Severity severity;
-  const char* message;  ///< what is wrong, as a sentence without names
+  const char* message;  ///< the fault, as a sentence without names
   const char* cure;
 };
 
@@ -49,8 +49,8 @@ struct Issue {
 using IssueSink = std::function<void(const Issue&)>;
 
 struct CheckOptions {
-  /// Told of bytes that are not read again, whole pages front to back, so that a mapping can give
-  /// them back (forget_read() in modar/mapped_file.hpp). None: nobody is told.
+  /// Receives bytes that are not read again, whole pages front to back, so that a mapping can give
+  /// them back (forget_read() in modar/mapped_file.hpp). None: nobody is notified.
   std::function<void(std::span<const std::byte>)> release;
   /// A newer minor version is no error: what it adds can be skipped, as devices do, and is not
   /// checked.
@@ -64,6 +64,9 @@ bool check_bundle(std::span<const std::byte> bytes, const IssueSink& sink,
 
 /// The first error that check_bundle() finds, as "ID where"; empty for a good bundle.
 std::string first_error(std::span<const std::byte> bytes, const CheckOptions& options = {});
+
+/// The rule NEVER_SHOWN alone.
+void check_shown(const BundleView& bundle, const IssueSink& sink);
 
 /// Checks the hash of every section, and nothing else: finds bytes that the storage has changed
 /// since the bundle was written, which BundleView::open() does not look at. Reads the whole file.

@@ -201,7 +201,7 @@ class GeometryCheck {
     tell(Rule::kIndexRange, wrong_index_, where, "indices are too great");
     tell(Rule::kNotFinite, not_finite_, where, "vertices are not finite");
     tell(Rule::kNormalLength, normal_, where, "normals are not of unit length");
-    tell(Rule::kChunkBounds, outside_, where, "vertices lie outside of the chunk's box");
+    tell(Rule::kChunkBounds, outside_, where, "vertices are outside the chunk's box");
     tell(Rule::kVertexPadding, padding_, where, "vertices have padding that is not zero");
     tell(Rule::kVertexOcclusion, occlusion_, where, "vertices have an occlusion above 127");
     tell(Rule::kDegenerateTriangles, degenerate_, where, "triangles use a vertex twice");

@@ -51,7 +51,7 @@ void check_media_files(FaultLog& log, const BundleParts& parts);
 /// grammar (validate_nodes.cpp).
 void check_node_texts(FaultLog& log, const BundleParts& parts);
 
-/// Compares the content summary with the bundle, line by line. Does nothing where there is none.
+/// Compares the content summary with the bundle, line by line. Does nothing if absent.
 void check_summary(FaultLog& log, const BundleParts& parts);
 
 /// Every index and every vertex that one refers to. Time grows with the index buffer. Needs a
@@ -80,7 +80,7 @@ inline std::string label(const BundleParts& parts, const char* what, NameRef nam
          "'";
 }
 
-/// "model 'spider'", "model 'spider', stand-in 2": whose chunks a group is.
+/// "model 'spider'", "model 'spider', proxy 2": whose chunks a group is.
 inline std::string group_label(const BundleParts& parts, std::uint32_t group) {
   const std::uint32_t model = parts.chunk_group(group).model;
   std::string text = label(parts, "model", parts.models[model].name);
@@ -90,7 +90,7 @@ inline std::string group_label(const BundleParts& parts, std::uint32_t group) {
          parts.chunk_group(group - number - 1).model == model) {
     ++number;
   }
-  return text + ", stand-in " + std::to_string(number);
+  return text + ", proxy " + std::to_string(number);
 }
 
 }  // namespace modar

@@ -15,7 +15,7 @@ namespace modar {
 /// behind its plane first. Fuchs, Kedem, Naylor, "On Visible Surface Generation by A Priori Tree
 /// Structures", 1980.
 struct DrawOrderRecord {
-  float plane[4];          ///< model space; a point p lies behind it where dot(xyz, p) + w < 0
+  float plane[4];          ///< model space; a point p is behind it where dot(xyz, p) + w < 0
   std::uint32_t behind;    ///< nodes of the subtree behind; the rest of its own is in front
   std::uint32_t triangle;  ///< in the plane; kNone: none
 };

@@ -10,7 +10,7 @@ namespace {
 struct Block {
   std::array<std::array<int, 3>, 2> base{};  ///< 8-bit colours of the two halves
   std::array<std::size_t, 2> table{};
-  bool flipped = false;  ///< halves lie one above the other
+  bool flipped = false;  ///< halves are one above the other
   std::uint32_t indices = 0;
 };
 

@@ -83,7 +83,7 @@ MODAR_FIELDS(NodeRecord, name, pattern, kind, subject, flags, group, place, rota
 MODAR_FIELDS(MediaRecord, name, kind, flags, width, height, seconds, poster, reserved);
 MODAR_FIELDS(ActionRecord, event, command, source, target, part, address, seconds, duration, axis,
              degrees, reserved);
-MODAR_FIELDS(StandInRecord, model, first_chunk, chunk_count, reserved);
+MODAR_FIELDS(ProxyRecord, model, first_chunk, chunk_count, reserved);
 MODAR_FIELDS(ColourGridHeader, columns, rows, reserved);
 MODAR_FIELDS(PatternShapeHeader, kind, face_count, half_arc, slope, reserved);
 MODAR_FIELDS(ShapeFaceRecord, place, corner, right, down, reserved);
@@ -120,7 +120,7 @@ constexpr RecordInfo kRecords[] = {
     table_of(MODAR_TYPE(ParameterSetRecord)), table_of(MODAR_TYPE(SceneRecord)),
     table_of(MODAR_TYPE(LightRecord)),        table_of(MODAR_TYPE(OcclusionRecord)),
     table_of(MODAR_TYPE(NodeRecord)),         table_of(MODAR_TYPE(ActionRecord)),
-    table_of(MODAR_TYPE(MediaRecord)),        table_of(MODAR_TYPE(StandInRecord)),
+    table_of(MODAR_TYPE(MediaRecord)),        table_of(MODAR_TYPE(ProxyRecord)),
     record_of(MODAR_TYPE(FileHeader)),        record_of(MODAR_TYPE(SectionEntry)),
     record_of(MODAR_TYPE(TableHeader)),       record_of(MODAR_TYPE(AttributeRecord)),
     record_of(MODAR_TYPE(FeatureHeader)),     record_of(MODAR_TYPE(KeypointRecord)),

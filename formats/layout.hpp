@@ -23,13 +23,11 @@ inline constexpr std::uint32_t kMaxNameBytes = 1024;
 inline constexpr std::uint32_t kMaxTextureSide = 8192;
 inline constexpr std::uint32_t kMaxPatternSide = 65535;
 inline constexpr std::uint32_t kMaxShadowSide = 256;
-inline constexpr std::uint32_t kMaxVertexStride = 252;  ///< bytes
+inline constexpr std::uint32_t kMaxPatternPicture = 32768;  ///< bytes
+inline constexpr std::uint32_t kMaxVertexStride = 252;      ///< bytes
 inline constexpr std::uint32_t kMaxDescriptorBits = 4096;
 inline constexpr std::uint8_t kMaxOcclusion = 127;
-/// What a length of the real world may be: from a nanometre to a million kilometres in a source
-/// unit, a pattern from a thousandth of a millimetre to ten kilometres. A scene's numbers and a
-/// light's come from divisions of such lengths. Wide enough for every use; what lies outside was
-/// never meant.
+/// Smallest length of a source unit, in metres. Values outside of these limits are errors.
 inline constexpr double kLeastUnitMetres = 1e-9;
 inline constexpr double kMostUnitMetres = 1e9;
 inline constexpr double kLeastPatternMm = 1e-3;
@@ -55,7 +53,7 @@ struct FileHeader {
 };
 static_assert(sizeof(FileHeader) == 64);
 
-/// Entries are sorted by (type, owner, variant), without duplicates, and their payloads lie in the
+/// Entries are sorted by (type, owner, variant), without duplicates, and their payloads are in the
 /// file in the same order. Bytes between sections are zero.
 struct SectionEntry {
   std::uint32_t type;
@@ -114,7 +112,7 @@ static_assert(sizeof(ModelRecord) == 160);
 
 /// A spatially compact part of a model with one material.
 /// Decoding: position = position_offset + position_step * attribute; uv = uv_offset + uv_scale *
-/// attribute (attributes as GL hands them to a shader: normalised ones lie in [0,1] or [-1,1]).
+/// attribute (attributes as GL hands them to a shader: normalised ones are in [0,1] or [-1,1]).
 struct ChunkRecord {
   float bounds_min[3];  ///< model space, conservative over all levels, decoded positions
   float bounds_max[3];
@@ -145,15 +143,15 @@ struct LevelRecord {
 static_assert(sizeof(LevelRecord) == 32);
 
 /// A whole model once more, as one coarse level: drawn in place of all chunks of the model, never
-/// beside one of them. Its chunks and levels are in tables of their own, which older readers skip;
-/// their numbers continue those of the models' chunks and levels.
-struct StandInRecord {
+/// together with one of them. Its chunks and levels are in tables of their own, which older readers
+/// skip; their numbers continue those of the models' chunks and levels.
+struct ProxyRecord {
   std::uint32_t model;  ///< index into kModels; those of one model from fine to coarse
   std::uint32_t first_chunk;
   std::uint32_t chunk_count;  ///< each has one level, and all state the error of the whole
   std::uint32_t reserved;
 };
-static_assert(sizeof(StandInRecord) == 16);
+static_assert(sizeof(ProxyRecord) == 16);
 
 struct MaterialRecord {
   NameRef name;
@@ -249,6 +247,9 @@ struct PatternRecord {
 static_assert(sizeof(PatternRecord) == 64);
 
 enum class Detector : std::uint32_t { kFastOrb = 1, kAgastBrisk = 2 };
+
+/// The parameter set that a bake stores where nobody names one: the choice of the ModAR paper.
+inline constexpr const char* kDefaultParameterSet = "orb-2000";
 
 /// Everything that detection on the device shares with the bake (Tables 4 and 5 of the ModAR
 /// paper).

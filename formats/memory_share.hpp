@@ -18,7 +18,7 @@ inline std::uint64_t texture_bytes(const BundleView& bundle, std::uint32_t textu
 }
 
 /// Bytes of the budget that geometry may take: half, and what all textures leave of the other half.
-/// textures: their bytes on the device. A budget of 0 stands for no limit.
+/// textures: their bytes on the device. A budget of 0 means no limit.
 inline std::uint64_t geometry_share(std::uint64_t textures, std::uint64_t budget) {
   return budget - std::min(budget / 2, textures);
 }

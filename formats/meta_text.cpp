@@ -31,7 +31,7 @@ int code_unit(std::string_view text) {
 }
 
 /// Of a number: more than the shortest text of an f64 takes, and an exponent with which no number
-/// of so many digits is beyond an f64.
+/// of this many digits is beyond an f64.
 constexpr std::size_t kMaxNumberBytes = 40;
 constexpr unsigned kMaxExponent = 250;
 
@@ -91,7 +91,7 @@ class JsonScan {
     }
   }
 
-  /// member(key): reads the value of a member; the key as it is written.
+  /// member(key): reads the value of a member; the key as written.
   template <class Member>
   bool object(Member member) {
     if (peek() != '{') return refuse("an object is missing");
@@ -111,7 +111,7 @@ class JsonScan {
   }
 
  private:
-  /// One character of a string, or an escape. Control characters of C1 may stand in JSON.
+  /// One character of a string, or an escape. Control characters of C1 may be in JSON.
   bool character() {
     const std::string_view rest = text_.substr(at_);
     if (rest[0] == '\\') return escape(rest);

@@ -10,8 +10,8 @@
 
 namespace modar {
 
-/// How the meta text of a first sight (trim.hpp) begins, and that of no other bundle.
-inline constexpr std::string_view kFirstSightMeta = R"({"stage": "show")";
+/// How the meta text of a preview (trim.hpp) begins, and that of no other bundle.
+inline constexpr std::string_view kPreviewMeta = R"({"stage": "show")";
 
 /// Arrays and objects inside each other; what `modar bake` writes needs six. Readers that call
 /// themselves for each need a bound.
@@ -31,9 +31,9 @@ std::optional<MetaFault> check_meta_text(std::string_view text);
 struct MetaText {
   enum class Kind : std::uint8_t {
     kText,
-    kAlt,      ///< says what is seen, for screen readers
+    kAlt,      ///< description for screen readers
     kTitle,    ///< of a node
-    kCaptions  ///< of a node: what is heard, as a WebVTT file; see captions.hpp
+    kCaptions  ///< of a node: captions, as a WebVTT file; see captions.hpp
   };
   std::string pattern;
   std::string node;  ///< of the member `nodes`

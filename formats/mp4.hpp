@@ -1,5 +1,5 @@
 // What an MP4 file says of itself (ISO/IEC 14496-12 and -15): codecs, sizes, duration, and whether
-// its index lies in front, so that it plays before all of it is there.
+// its index is in front, so that it plays before all of it is there.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@ struct Mp4Info {
   std::uint32_t width = 0;            ///< pixels
   std::uint32_t height = 0;
   double seconds = 0;        ///< of the longest track
-  bool index_first = false;  ///< the box "moov" lies before "mdat"
+  bool index_first = false;  ///< the box "moov" is before "mdat"
 };
 
 /// Where a file breaks the rules, and which.

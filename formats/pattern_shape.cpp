@@ -28,7 +28,7 @@ const char* check_face(const ShapeFaceRecord& face, std::uint32_t width, std::ui
   if (face.place[2] == 0 || face.place[3] == 0 ||
       std::uint32_t{face.place[0]} + face.place[2] > width ||
       std::uint32_t{face.place[1]} + face.place[3] > height) {
-    return "a face lies outside of the picture";
+    return "a face is outside the picture";
   }
   if (!near(face.corner) || !near(face.right) || !near(face.down)) {
     return "a face's place is not within 1000 units";

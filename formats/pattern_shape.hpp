@@ -15,7 +15,7 @@ namespace modar {
 inline constexpr std::uint32_t kMaxShapeFaces = 16;
 
 enum class ShapeKind : std::uint32_t {
-  kRound = 1,  ///< part of a cylinder or a cone, whose axis lies behind the picture's middle
+  kRound = 1,  ///< part of a cylinder or a cone, whose axis is behind the picture's middle
   kFaces = 2,  ///< flat parts of the picture, each at its place in space
 };
 
@@ -29,7 +29,7 @@ struct PatternShapeHeader {
 };
 static_assert(sizeof(PatternShapeHeader) == 32);
 
-/// A rectangle of the picture and where it lies, in pattern units.
+/// A rectangle of the picture and its place, in pattern units.
 struct ShapeFaceRecord {
   std::uint16_t place[4];  ///< left, top, width, height: pixels of the picture
   float corner[3];         ///< its top left corner
@@ -56,7 +56,7 @@ class PatternSurface {
   static PatternSurface round(int width, int height, double half_arc, double slope);
   /// The faces must outlive it.
   static PatternSurface of_faces(int width, int height, std::span<const ShapeFaceRecord> faces);
-  /// x, y: pixels, whose centres lie at whole numbers. Outside of the picture the surface goes on.
+  /// x, y: pixels, whose centres are at whole numbers. Outside the picture the surface continues.
   [[nodiscard]] SurfacePoint at(double x, double y) const;
 
   [[nodiscard]] double width() const { return width_; }  ///< of the picture, pixels

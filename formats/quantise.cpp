@@ -56,7 +56,7 @@ std::uint16_t float_to_half(float value) {
   const std::uint32_t magnitude = bits & 0x7FFFFFFFu;
   std::uint32_t half = 0;
   if (magnitude > 0x7F800000u) {
-    // The quiet bit keeps a NaN whose payload lies in the lost bits from turning into infinity.
+    // The quiet bit keeps a NaN whose payload is in the lost bits from turning into infinity.
     half = 0x7C00u | 0x0200u | ((magnitude >> 13) & 0x03FFu);
   } else if (magnitude >= 0x47800000u) {  // 2^16 and up, infinity
     half = 0x7C00u;

@@ -51,8 +51,8 @@ constexpr IssueKind kIssueKinds[] = {
      "A model refers to chunks, materials or a layout that do not exist", kRebake},
     {"BUNDLE_CHUNK_RANGE", Severity::kError,
      "A chunk has no levels, levels of another chunk, or an impossible box", kRebake},
-    {"BUNDLE_STAND_IN", Severity::kError,
-     "A stand-in has no model, chunks of another, or not one level of one error in each chunk",
+    {"BUNDLE_PROXY", Severity::kError,
+     "A proxy has no model, chunks of another, or not one level of one error in each chunk",
      kRebake},
     {"BUNDLE_LEVEL_RANGE", Severity::kError,
      "A level of detail refers to vertices or indices that do not exist", kRebake},
@@ -62,7 +62,7 @@ constexpr IssueKind kIssueKinds[] = {
     {"BUNDLE_TEXTURE_RANGE", Severity::kError,
      "A texture has an impossible size or refers to levels that do not exist", kRebake},
     {"BUNDLE_TEXTURE_LEVEL", Severity::kError,
-     "A texture level has the wrong size or lies outside its data", kRebake},
+     "A texture level has the wrong size or is outside its data", kRebake},
     {"BUNDLE_PATTERN", Severity::kError, "A pattern's sizes are inconsistent", kRebake},
     {"BUNDLE_PARAMETER_SET", Severity::kError,
      "A parameter set is out of order or has an impossible descriptor", kRebake},
@@ -91,7 +91,7 @@ constexpr IssueKind kIssueKinds[] = {
      kRebake},
     {"MODEL_COUNTS", Severity::kError, "A model's counts differ from its contents", kRebake},
     {"MODEL_ERRORS", Severity::kError, "A model's mean error is greater than its maximum", kRebake},
-    {"CHUNK_BOUNDS", Severity::kError, "A vertex lies outside its chunk's box", kRebake},
+    {"CHUNK_BOUNDS", Severity::kError, "A vertex is outside its chunk's box", kRebake},
     {"CHUNK_LOOSE", Severity::kError, "A chunk's box is larger than its vertices need", kRebake},
     {"CHUNK_OUTSIDE", Severity::kError, "A chunk's box extends past the unit cube", kRebake},
     {"CHUNK_CONE", Severity::kError,
@@ -114,7 +114,7 @@ constexpr IssueKind kIssueKinds[] = {
     {"TEXTURE_UNREFERENCED", Severity::kWarning, "Bytes of a texture belong to no level", kRebake},
     {"PARAMETER_VALUES", Severity::kError,
      "A parameter set has values that its detector cannot run with", kRebake},
-    {"KEYPOINT_OUTSIDE", Severity::kError, "A keypoint lies outside its pattern", kRebake},
+    {"KEYPOINT_OUTSIDE", Severity::kError, "A keypoint is outside its pattern", kRebake},
     {"KEYPOINT_VALUES", Severity::kError, "A keypoint's size, angle or octave is impossible",
      kRebake},
     {"DESCRIPTOR_LENGTH", Severity::kError, "Descriptors do not have their detector's length",
@@ -142,6 +142,9 @@ constexpr IssueKind kIssueKinds[] = {
     {"LEVEL_EMPTY", Severity::kWarning, "A level of detail has no triangles", kRebake},
     {"BUNDLE_EMPTY", Severity::kWarning, "The bundle holds neither models nor patterns",
      "bake it with --model or --pattern"},
+    {"NEVER_SHOWN", Severity::kWarning,
+     "A model is on no pattern, or nothing is on a pattern: visitors download it and never see it",
+     "add a scene of it, or leave it out"},
     {"NODE_TEXT", Severity::kWarning, "A label lacks a title in a language that others have",
      "write title.LANGUAGE for each language"},
     {"CAPTIONS_MISSING", Severity::kWarning,
@@ -267,7 +270,7 @@ std::string issues_markdown() {
   return "# Issues that the checker reports\n\n"
          "Ids are stable. A bundle with an error fails validation; warnings do not matter for "
          "that.\n\n"
-         "| id | severity | what is wrong | what to do |\n|---|---|---|---|\n" +
+         "| id | severity | fault | what to do |\n|---|---|---|---|\n" +
          issue_rows(kIssueKinds);
 }
 

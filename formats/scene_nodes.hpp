@@ -1,4 +1,4 @@
-// What stands on a pattern beside plain models, and what happens to it: named nodes (models,
+// A pattern's content other than plain models, and its actions: named nodes (models,
 // planes, labels, sounds) and actions. action_machine.hpp runs them.
 #pragma once
 
@@ -47,7 +47,9 @@ static_assert(sizeof(MediaRecord) == 48);
 inline constexpr std::uint32_t kMostVideoWidth = 1280;  ///< of the tier `desktop`
 inline constexpr std::uint32_t kMostVideoHeight = 720;
 
-/// A named part of what stands on a pattern.
+inline constexpr std::uint32_t kMaxMarkBytes = 32;  ///< of a label: a number or a short word
+
+/// A named part of a pattern's content.
 struct NodeRecord {
   NameRef name;  ///< not empty; no other node of the pattern has it
   std::uint32_t pattern;
@@ -84,12 +86,12 @@ enum class ActionCommand : std::uint32_t {
   kHide = 4,
   kToggle = 5,
   kText = 6,  ///< the words of a label are shown
-  kLink = 7,  ///< the visitor is asked whether to go there
+  kLink = 7,  ///< the visitor decides whether to go there
   kNext = 8,  ///< the next variant of the target's group takes the place of the one that is shown
   kTurn = 10,
 };
 
-/// What is done when something happens.
+/// The reaction to an event.
 struct ActionRecord {
   std::uint32_t event;    ///< ActionEvent
   std::uint32_t command;  ///< ActionCommand

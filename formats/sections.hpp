@@ -2,7 +2,7 @@
 // number that is used twice does not compile. bundle.md is the normative text; tests hold both, and
 // the second reader, against each other.
 //
-// Free: tables and small text 5-15, 21-31, 34-47, 50-63, 73-255; payloads 264-511, 515 and up.
+// Free: tables and small text 5-15, 21-31, 34-47, 50-63, 73-255; payloads 265-511, 515 and up.
 #pragma once
 
 #include <array>
@@ -22,8 +22,8 @@ enum SectionFlags : std::uint16_t {
 };
 
 // Types below 256 are tables and small text, from 256 on payloads, so that everything that opening
-// a bundle reads lies in its first pages. Numbers are never reused. X(constant, number, name,
-// record of the table or at the start, minor version, flags, owner)
+// a bundle reads is in its first pages. Numbers are never reused. X(constant, number, name, record
+// of the table or at the start, minor version, flags, owner)
 #define MODAR_SECTIONS(X)                                                                      \
   X(kNames, 1, "names", "", 0, kSectionRequired, kNothing)                                     \
   X(kMeta, 2, "meta", "", 0, 0, kNothing)                                                      \
@@ -41,12 +41,12 @@ enum SectionFlags : std::uint16_t {
   X(kScenes, 64, "scenes", "SceneRecord", 0, kSectionRequired, kNothing)                       \
   X(kLights, 65, "lights", "LightRecord", 2, 0, kNothing)                                      \
   X(kOcclusion, 66, "occlusion", "OcclusionRecord", 2, 0, kNothing)                            \
-  X(kStandIns, 67, "stand_ins", "StandInRecord", 3, 0, kNothing)                               \
+  X(kProxies, 67, "proxies", "ProxyRecord", 3, 0, kNothing)                                    \
   X(kNodes, 68, "nodes", "NodeRecord", 3, 0, kNothing)                                         \
   X(kActions, 69, "actions", "ActionRecord", 3, 0, kNothing)                                   \
   X(kMedia, 70, "media", "MediaRecord", 3, 0, kNothing)                                        \
-  X(kStandInChunks, 71, "stand_in_chunks", "ChunkRecord", 3, 0, kNothing)                      \
-  X(kStandInLevels, 72, "stand_in_levels", "LevelRecord", 3, 0, kNothing)                      \
+  X(kProxyChunks, 71, "proxy_chunks", "ChunkRecord", 3, 0, kNothing)                           \
+  X(kProxyLevels, 72, "proxy_levels", "LevelRecord", 3, 0, kNothing)                           \
   X(kMappedFeatures, 256, "feature_twin", "FeatureHeader", 0, kSectionRequired, kPattern)      \
   X(kFeatureYml, 257, "feature_text", "", 0, 0, kPattern)                                      \
   X(kTrackerRecord, 258, "tracker_record", "TrackerRecordHeader", 0, 0, kPattern)              \
@@ -55,6 +55,7 @@ enum SectionFlags : std::uint16_t {
   X(kPatternShape, 261, "pattern_shape", "PatternShapeHeader", 2, 0, kPattern)                 \
   X(kDrawOrder, 262, "draw_order", "DrawOrderRecord", 2, 0, kChunk)                            \
   X(kMediaData, 263, "media_data", "", 3, 0, kMedia)                                           \
+  X(kPatternPicture, 264, "pattern_picture", "", 3, 0, kPattern)                               \
   X(kVertices, 512, "vertices", "", 0, kSectionRequired | kSectionGpu, kNothing)               \
   X(kIndices, 513, "indices", "", 0, kSectionRequired | kSectionGpu, kNothing)                 \
   X(kTextureData, 514, "texture_data", "", 0, kSectionRequired | kSectionGpu, kTexture)
@@ -97,12 +98,12 @@ constexpr const SectionInfo& section_of_record(std::string_view record) {
   for (std::size_t i = kSections.size(); i-- > 0;) {
     if (record == kSections[i].record) found = &kSections[i];
   }
-  return *found;  // does not compile where there is none
+  return *found;  // does not compile if none exists
 }
 
 enum MaterialFlags : std::uint32_t {
   kMaterialTwoSided = 1,
-  kMaterialOccluder = 2,            ///< hides what is behind it and shows the camera's picture
+  kMaterialOccluder = 2,            ///< hides content behind it and shows the camera's picture
   kMaterialMetalness = 0xFF00,      ///< a share in 255ths, see material_share()
   kMaterialReflectance = 0xFF0000,  ///< likewise
 };

@@ -104,7 +104,7 @@ std::optional<TrackerFault> view_tracker_record(std::span<const std::byte> bytes
       return TrackerFault{array.field, "an array is unaligned"};
     if (array.offset < sizeof header || array.offset > bytes.size() ||
         array.size > bytes.size() - array.offset) {
-      return TrackerFault{array.field, "an array lies outside of the section"};
+      return TrackerFault{array.field, "an array is outside the section"};
     }
   }
   const auto* base = bytes.data();
@@ -118,11 +118,11 @@ std::optional<TrackerFault> view_tracker_record(std::span<const std::byte> bytes
   view.pixels = {reinterpret_cast<const std::uint8_t*>(base + header.pixels_offset),
                  static_cast<std::size_t>(arrays[3].size)};
   if (auto fault = check_places(header, view.features, header.features_offset,
-                                "a feature lies outside of the image")) {
+                                "a feature is outside the image")) {
     return fault;
   }
   if (auto fault = check_places(header, view.patches, header.patches_offset,
-                                "a patch lies outside of the image")) {
+                                "a patch is outside the image")) {
     return fault;
   }
   return check_patch_levels(header, view.patches);

@@ -30,11 +30,11 @@ std::vector<std::byte> bytes_of(std::span<const std::byte> bytes) {
 bool has_member(SectionType type) {
   using enum SectionType;
   constexpr SectionType kMembers[] = {
-      kNames,      kMeta,     kContentSummary, kModels,        kChunks,      kLevels,
-      kMaterials,  kLayouts,  kTextures,       kTextureLevels, kPatterns,    kParameterSets,
-      kScenes,     kLights,   kOcclusion,      kNodes,         kActions,     kMappedFeatures,
-      kFeatureYml, kShadow,   kVertices,       kIndices,       kTextureData, kMedia,
-      kMediaData,  kStandIns, kStandInChunks,  kStandInLevels};
+      kNames,      kMeta,    kContentSummary, kModels,        kChunks,      kLevels,
+      kMaterials,  kLayouts, kTextures,       kTextureLevels, kPatterns,    kParameterSets,
+      kScenes,     kLights,  kOcclusion,      kNodes,         kActions,     kMappedFeatures,
+      kFeatureYml, kShadow,  kVertices,       kIndices,       kTextureData, kMedia,
+      kMediaData,  kProxies, kProxyChunks,    kProxyLevels};
   return std::find(std::begin(kMembers), std::end(kMembers), type) != std::end(kMembers);
 }
 
@@ -61,17 +61,17 @@ void keep_features(const BundleView& bundle, BundleContent& content) {
 }
 
 /// Behind content.chunks and content.levels.
-void copy_stand_ins(const BundleView& bundle, BundleContent& content) {
-  content.stand_ins = records_of(bundle.stand_ins());
+void copy_proxies(const BundleView& bundle, BundleContent& content) {
+  content.proxies = records_of(bundle.proxies());
   const auto chunks = static_cast<std::uint32_t>(content.chunks.size());
   const auto levels = static_cast<std::uint32_t>(content.levels.size());
-  for (StandInRecord& stand_in : content.stand_ins) stand_in.first_chunk -= chunks;
+  for (ProxyRecord& proxy : content.proxies) proxy.first_chunk -= chunks;
   for (std::uint32_t c = chunks; c < bundle.chunks().size(); ++c) {
-    content.stand_in_chunks.push_back(bundle.chunks()[c]);
-    content.stand_in_chunks.back().first_level -= levels;
+    content.proxy_chunks.push_back(bundle.chunks()[c]);
+    content.proxy_chunks.back().first_level -= levels;
   }
   for (std::uint32_t l = levels; l < bundle.levels().size(); ++l) {
-    content.stand_in_levels.push_back(bundle.levels()[l]);
+    content.proxy_levels.push_back(bundle.levels()[l]);
   }
 }
 
@@ -98,7 +98,7 @@ ExtraSection extra_of(const BundleView& bundle, const SectionEntry& entry) {
           entry.owner, entry.variant, bytes_of(bundle.section(type, entry.owner, entry.variant))};
 }
 
-/// Tables that are about neither stand-ins nor features.
+/// Tables that are about neither proxies nor features.
 BundleContent tables_of(const BundleView& bundle) {
   BundleContent content;
   const auto names = bundle.section(SectionType::kNames);
@@ -121,12 +121,13 @@ BundleContent tables_of(const BundleView& bundle) {
   return content;
 }
 
-// --- The first sight ---
+// --- The preview ---
 
-/// Ranges of a section without what lies between them. Those that share bytes go on to share them.
-class Kept {
+/// Ranges of a section without the bytes between them. Those that share bytes continue to share
+/// them.
+class KeptRanges {
  public:
-  Kept(std::span<const std::byte> section, std::vector<StageRange> ranges) {
+  KeptRanges(std::span<const std::byte> section, std::vector<StageRange> ranges) {
     std::sort(ranges.begin(), ranges.end(),
               [](const StageRange& a, const StageRange& b) { return a.offset < b.offset; });
     std::uint64_t end = 0;
@@ -142,7 +143,7 @@ class Kept {
       end += more.size();
     }
   }
-  /// Where the range lies now that began at `offset`.
+  /// The new place of the range that began at `offset`.
   [[nodiscard]] std::uint64_t place(std::uint64_t offset) const {
     const auto run = std::prev(runs_.upper_bound(offset));
     return run->second + (offset - run->first);
@@ -151,10 +152,10 @@ class Kept {
   std::vector<std::byte> bytes;
 
  private:
-  std::map<std::uint64_t, std::uint64_t> runs_;  ///< from where one begins to where it lies now
+  std::map<std::uint64_t, std::uint64_t> runs_;  ///< from the old place of one to its new place
 };
 
-/// A model that its stand-in has taken the place of: one level, off by the stand-in's error.
+/// A model that its proxy has taken the place of: one level, off by the proxy's error.
 void count_anew(ModelRecord& model, std::span<const LevelRecord> levels, float error) {
   model.level_count = 1;
   model.position_error_max += static_cast<double>(error) * model.scale;
@@ -167,13 +168,13 @@ void count_anew(ModelRecord& model, std::span<const LevelRecord> levels, float e
 }
 
 void keep_shown_geometry(const BundleView& bundle, BundleContent& content) {
-  Kept vertices(bundle.vertices(), shown_geometry(bundle, false));
-  Kept indices(bundle.indices(), shown_geometry(bundle, true));
+  KeptRanges vertices(bundle.vertices(), shown_geometry(bundle, false));
+  KeptRanges indices(bundle.indices(), shown_geometry(bundle, true));
   content.chunks.clear();
   content.levels.clear();
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
-    const std::uint32_t stand_in = coarsest_stand_in(bundle, m);
-    const ChunkGroup group = bundle.chunk_group(stand_in == kNone ? m : stand_in);
+    const std::uint32_t proxy = coarsest_proxy(bundle, m);
+    const ChunkGroup group = bundle.chunk_group(proxy == kNone ? m : proxy);
     ModelRecord& model = content.models[m];
     model.first_chunk = static_cast<std::uint32_t>(content.chunks.size());
     model.chunk_count = group.chunk_count;
@@ -185,13 +186,13 @@ void keep_shown_geometry(const BundleView& bundle, BundleContent& content) {
         LevelRecord level = bundle.levels()[chunk.first_level + l];
         level.vertex_offset = vertices.place(level.vertex_offset);
         level.index_offset = indices.place(level.index_offset);
-        if (stand_in != kNone) error = std::exchange(level.error, 0.0f);
+        if (proxy != kNone) error = std::exchange(level.error, 0.0f);
         content.levels.push_back(level);
       }
       chunk.first_level = static_cast<std::uint32_t>(content.levels.size()) - chunk.level_count;
       content.chunks.push_back(chunk);
     }
-    if (stand_in != kNone) count_anew(model, std::span(content.levels).subspan(first), error);
+    if (proxy != kNone) count_anew(model, std::span(content.levels).subspan(first), error);
   }
   content.vertices = std::move(vertices.bytes);
   content.indices = std::move(indices.bytes);
@@ -201,7 +202,7 @@ void keep_shown_textures(const BundleView& bundle, BundleContent& content) {
   content.texture_levels.clear();
   for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
     TextureRecord& texture = content.textures[t];
-    const Kept blocks(bundle.texture_data(t), shown_blocks(bundle, t));
+    const KeptRanges blocks(bundle.texture_data(t), shown_blocks(bundle, t));
     const std::uint32_t first = first_shown_level(bundle, texture);
     const std::uint32_t from = texture.first_level + first;
     texture.first_level = static_cast<std::uint32_t>(content.texture_levels.size());
@@ -231,7 +232,7 @@ void keep_shown_extra(const BundleView& bundle, BundleContent& content) {
     if (type == SectionType::kDrawOrder) {
       std::uint32_t m = 0;
       while (bundle.models()[m].first_chunk + bundle.models()[m].chunk_count <= entry.owner) ++m;
-      if (coarsest_stand_in(bundle, m) != kNone) continue;
+      if (coarsest_proxy(bundle, m) != kNone) continue;
       extra.owner = entry.owner - bundle.models()[m].first_chunk + content.models[m].first_chunk;
     }
     content.extra.push_back(std::move(extra));
@@ -248,9 +249,9 @@ void leave_out_last(BundleContent& content) {
   std::erase_if(content.nodes, plays_media);
 }
 
-std::string first_sight_meta(std::string_view meta) {
+std::string preview_meta(std::string_view meta) {
   const std::size_t first = meta.find_first_not_of(" \t\r\n", meta.find('{') + 1);
-  const std::string begin(kFirstSightMeta);
+  const std::string begin(kPreviewMeta);
   if (meta.empty() || first == std::string_view::npos) return begin + "}";
   return begin + (meta[first] == '}' ? "" : ", ") + std::string(meta.substr(first));
 }
@@ -259,7 +260,7 @@ std::string first_sight_meta(std::string_view meta) {
 
 BundleContent trim(const BundleView& bundle) {
   BundleContent content = tables_of(bundle);
-  copy_stand_ins(bundle, content);
+  copy_proxies(bundle, content);
   keep_features(bundle, content);
   copy_payloads(bundle, content);
   copy_shadows(bundle, content);
@@ -304,9 +305,9 @@ std::optional<std::vector<std::byte>> hide_twins(std::span<const std::byte> star
   return out;
 }
 
-BundleContent first_sight(const BundleView& bundle) {
+BundleContent preview(const BundleView& bundle) {
   BundleContent content = tables_of(bundle);
-  content.meta = first_sight_meta(bundle.meta());
+  content.meta = preview_meta(bundle.meta());
   keep_features(bundle, content);
   keep_shown_geometry(bundle, content);
   keep_shown_textures(bundle, content);

@@ -1,5 +1,5 @@
 // Smaller bundles from a bundle: without what only the ModAR paper's method reads, as pages get it,
-// and the first sight of one that is yet to arrive.
+// and the preview of one that is yet to arrive.
 #pragma once
 
 #include <cstddef>
@@ -18,14 +18,14 @@ namespace modar {
 BundleContent trim(const BundleView& bundle);
 
 /// Takes the feature twins and texts that trim() leaves out from a section table, so that a bundle
-/// without their bytes opens. start: header and section table, whose length stays; nothing where it
-/// is none.
+/// without their bytes opens. start: header and section table, whose length stays; nothing if it is
+/// not one.
 std::optional<std::vector<std::byte>> hide_twins(std::span<const std::byte> start);
 
 /// What LoadStage::kShow shows of a bundle whose last stage is yet to come, as a good bundle of its
-/// own: of each model the coarsest stand-in, or all where it has none; textures from kShownSide on;
+/// own: of each model the coarsest proxy, or all where it has none; textures from kShownSide on;
 /// patterns as trim() keeps them. What plays media, and all actions, are left out. bundle: reads
-/// what stages 1 and 2 bring, and nothing else.
-BundleContent first_sight(const BundleView& bundle);
+/// the bytes of stages 1 and 2, and nothing else.
+BundleContent preview(const BundleView& bundle);
 
 }  // namespace modar

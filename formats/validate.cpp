@@ -107,7 +107,7 @@ void check_kind(const RecordCheck& check, const SectionEntry& entry, bool newer)
   }
 }
 
-/// True if the section lies inside the file, behind `end`.
+/// True if the section is inside the file, behind `end`.
 bool check_place(const RecordCheck& check, const SectionEntry& entry, std::uint64_t end,
                  std::uint64_t file_size) {
   const std::uint64_t alignment =
@@ -121,7 +121,7 @@ bool check_place(const RecordCheck& check, const SectionEntry& entry, std::uint6
   if (entry.offset < end || entry.offset > file_size || entry.size > file_size - entry.offset) {
     check.fault(Rule::kSectionRange, &entry.offset,
                 std::to_string(entry.size) + " bytes at " + std::to_string(entry.offset) +
-                    " do not lie between byte " + std::to_string(end) + " and the end, " +
+                    " are not between byte " + std::to_string(end) + " and the end, " +
                     std::to_string(file_size));
     return false;
   }
@@ -267,12 +267,12 @@ bool validate_tables(FaultLog& log, BundleParts& parts) {
   walkable &= find_table(log, parts, SectionType::kNodes, parts.nodes);
   walkable &= find_table(log, parts, SectionType::kActions, parts.actions);
   walkable &= find_table(log, parts, SectionType::kMedia, parts.media);
-  walkable &= find_table(log, parts, SectionType::kStandIns, parts.stand_ins);
+  walkable &= find_table(log, parts, SectionType::kProxies, parts.proxies);
   Table<ChunkRecord> chunks;
-  walkable &= find_table(log, parts, SectionType::kStandInChunks, chunks);
+  walkable &= find_table(log, parts, SectionType::kProxyChunks, chunks);
   parts.chunks.append(chunks);
   Table<LevelRecord> levels;
-  walkable &= find_table(log, parts, SectionType::kStandInLevels, levels);
+  walkable &= find_table(log, parts, SectionType::kProxyLevels, levels);
   parts.levels.append(levels);
   return walkable && !log.stop();
 }
@@ -444,7 +444,7 @@ void check_level(const RecordCheck& check, const BundleParts& parts, const Level
       vertex_bytes > parts.vertices.size() - level.vertex_offset) {
     check.fault(Rule::kLevelRange, &level.vertex_offset,
                 std::to_string(level.vertex_count) + " vertices of " + std::to_string(stride) +
-                    " bytes at " + std::to_string(level.vertex_offset) + " do not lie in the " +
+                    " bytes at " + std::to_string(level.vertex_offset) + " are not in the " +
                     std::to_string(parts.vertices.size()) + " bytes of vertices");
   }
   const std::uint64_t index_bytes = std::uint64_t{level.index_count} * 2;
@@ -480,7 +480,7 @@ void check_chunk(const RecordCheck& check, const ModelRecord& model, const Chunk
   if (chunk.material < model.first_material ||
       chunk.material - model.first_material >= model.material_count) {
     check.fault(Rule::kMaterialRange, &chunk.material,
-                "material " + std::to_string(chunk.material) + " is none of its model's");
+                "material " + std::to_string(chunk.material) + " is not one of its model's");
   }
 }
 
@@ -512,7 +512,7 @@ struct NextPlaces {
   std::uint64_t level = 0;
 };
 
-/// Chunks of a model, or of one of its stand-ins, and their levels, which lie in the first `levels`
+/// Chunks of a model, or of one of its proxies, and their levels, which are in the first `levels`
 /// of the table.
 void check_chunks(FaultLog& log, const BundleParts& parts, const ChunkGroup& group,
                   std::uint32_t levels, std::uint64_t& next_level) {
@@ -559,47 +559,46 @@ void check_groups(FaultLog& log, const BundleParts& parts, NextPlaces& next) {
   }
 }
 
-/// One level a chunk, and one error for all: a stand-in is drawn as a whole.
-void check_stand_in(const RecordCheck& check, const BundleParts& parts, std::uint32_t index) {
-  const StandInRecord& stand_in = parts.stand_ins[index];
-  bool good = stand_in.chunk_count > 0;
-  for (std::uint32_t c = 0; good && c < stand_in.chunk_count; ++c) {
-    const ChunkRecord& first = parts.chunks[stand_in.first_chunk];
-    const ChunkRecord& chunk = parts.chunks[stand_in.first_chunk + c];
+/// One level a chunk, and one error for all: a proxy is drawn as a whole.
+void check_proxy(const RecordCheck& check, const BundleParts& parts, std::uint32_t index) {
+  const ProxyRecord& proxy = parts.proxies[index];
+  bool good = proxy.chunk_count > 0;
+  for (std::uint32_t c = 0; good && c < proxy.chunk_count; ++c) {
+    const ChunkRecord& first = parts.chunks[proxy.first_chunk];
+    const ChunkRecord& chunk = parts.chunks[proxy.first_chunk + c];
     good = chunk.level_count == 1 &&
            parts.levels[chunk.first_level].error == parts.levels[first.first_level].error;
   }
   if (!good) {
-    check.fault(Rule::kStandIn, &stand_in.first_chunk,
+    check.fault(Rule::kProxy, &proxy.first_chunk,
                 "it has no chunks, or not one level of one error in each");
   }
 }
 
-void check_stand_ins(FaultLog& log, const BundleParts& parts, NextPlaces& next) {
+void check_proxies(FaultLog& log, const BundleParts& parts, NextPlaces& next) {
   const std::uint64_t faults = log.errors();
   std::uint32_t last = 0;
-  for (std::uint32_t i = 0; i < parts.stand_ins.size() && !log.stop(); ++i) {
-    const StandInRecord& stand_in = parts.stand_ins[i];
-    const RecordCheck check(log, parts, "stand-in", i);
-    check.reserved(&stand_in.reserved, sizeof(stand_in.reserved));
-    if (stand_in.model >= parts.models.size() || stand_in.model < last) {
-      return check.fault(
-          Rule::kStandIn, &stand_in.model,
-          "model " + std::to_string(stand_in.model) + " is not there or out of order");
+  for (std::uint32_t i = 0; i < parts.proxies.size() && !log.stop(); ++i) {
+    const ProxyRecord& proxy = parts.proxies[i];
+    const RecordCheck check(log, parts, "proxy", i);
+    check.reserved(&proxy.reserved, sizeof(proxy.reserved));
+    if (proxy.model >= parts.models.size() || proxy.model < last) {
+      return check.fault(Rule::kProxy, &proxy.model,
+                         "model " + std::to_string(proxy.model) + " is not there or out of order");
     }
-    last = stand_in.model;
-    if (!check.range(Rule::kStandIn, stand_in.first_chunk, stand_in.chunk_count, next.chunk,
+    last = proxy.model;
+    if (!check.range(Rule::kProxy, proxy.first_chunk, proxy.chunk_count, next.chunk,
                      parts.chunks.size(), "chunk")) {
       return;
     }
-    next.chunk += stand_in.chunk_count;
+    next.chunk += proxy.chunk_count;
     check_chunks(log, parts, parts.chunk_group(parts.models.size() + i), parts.levels.size(),
                  next.level);
-    if (log.errors() == faults) check_stand_in(check, parts, i);
+    if (log.errors() == faults) check_proxy(check, parts, i);
   }
   if (log.errors() == faults &&
       (next.chunk != parts.chunks.size() || next.level != parts.levels.size())) {
-    log.add(Rule::kStandIn, 0, "stand-ins",
+    log.add(Rule::kProxy, 0, "proxies",
             std::to_string(parts.chunks.size() - next.chunk) + " chunks and " +
                 std::to_string(parts.levels.size() - next.level) + " levels belong to none");
   }
@@ -619,7 +618,7 @@ void validate_models(FaultLog& log, const BundleParts& parts) {
   NextPlaces next;
   check_groups(log, parts, next);
   if (log.errors() != faults) return;
-  check_stand_ins(log, parts, next);
+  check_proxies(log, parts, next);
   if (log.errors() != faults) return;
   // Levels that shared indices could make a small file cost any time to draw or check.
   std::uint64_t index_bytes = 0;
@@ -691,7 +690,7 @@ void check_texture_level(const RecordCheck& check, const TextureRecord& texture,
       (alpha ? !inside(level.alpha_offset) : level.alpha_offset != kNoOffset)) {
     check.fault(Rule::kTextureLevel, &level.offset,
                 "its blocks at " + std::to_string(level.offset) + " or their alpha twin at " +
-                    std::to_string(level.alpha_offset) + " do not lie in the " +
+                    std::to_string(level.alpha_offset) + " are not in the " +
                     std::to_string(data_size) + " bytes of the texture");
   }
 }
@@ -983,7 +982,7 @@ void check_occlusion(const RecordCheck& check, const BundleParts& parts, std::ui
   if (good) {
     const LayoutRecord& layout = parts.layouts[record.layout];
     good = record.offset < layout.stride;
-    // The layout itself may be wrong: what is told of it elsewhere ends no check of this record.
+    // The layout itself may be wrong: statements about it elsewhere end no check of this record.
     const std::size_t count =
         std::min<std::size_t>(layout.attribute_count, std::size(layout.attributes));
     for (std::size_t i = 0; i < count; ++i) {

@@ -14,7 +14,7 @@
 
 namespace modar {
 
-/// Header and section table. False where the sections cannot be trusted to lie inside the file;
+/// Header and section table. False if the sections cannot be trusted to be inside the file;
 /// otherwise fills parts.bytes and parts.sections.
 bool validate_sections(std::span<const std::byte> bytes, FaultLog& log, BundleParts& parts);
 
@@ -70,7 +70,7 @@ class RecordCheck {
   RecordCheck(FaultLog& log, const BundleParts& parts, const char* what, std::uint32_t index)
       : log_(log), parts_(parts), what_(what), index_(index) {}
 
-  // What tells of faults is not inline: the player has a hundred calls of it.
+  // Reports of faults are not inline: the player has a hundred calls of it.
 
   /// `field` points into the record.
   void fault(Rule rule, const void* field, std::string detail) const;
@@ -87,7 +87,7 @@ class RecordCheck {
                double high = std::numeric_limits<T>::max()) const {
     for (const T& field : fields) number(field, name, low, high);
   }
-  /// 0, which stands for an unknown size, or within [low, high].
+  /// 0, which means an unknown size, or within [low, high].
   void size(const double& field, const char* name, double low, double high) const {
     if (field != 0.0) number(field, name, low, high);
   }
@@ -95,7 +95,7 @@ class RecordCheck {
   void reserved(const void* field, std::size_t bytes) const;
   void flags(const std::uint32_t& field, std::uint32_t known) const;
 
-  /// The name lies inside the names section and starts and ends at characters.
+  /// The name is inside the names section and starts and ends at characters.
   void name(const NameRef& ref) const;
 
   /// True if first == expected and first + count stays within size; ranges follow each other.

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "formats/base/address.hpp"
 #include "formats/captions.hpp"
 #include "formats/check_rules.hpp"
 #include "formats/meta_text.hpp"
@@ -15,8 +16,6 @@
 
 namespace modar {
 namespace {
-
-constexpr std::uint32_t kMostMarkBytes = 32;  // of a label: a number or a short word
 
 std::string_view text_of(const BundleParts& parts, NameRef ref) {
   return {reinterpret_cast<const char*>(parts.names.data()) + ref.offset, ref.length};
@@ -52,7 +51,7 @@ bool fits_kind(const BundleParts& parts, const NodeRecord& node) {
              (node.flags & kNodeHidden) == 0;
     case NodeKind::kLabel:
       return node.subject == kNone && no_size && node.mark.length > 0 &&
-             node.mark.length <= kMostMarkBytes && node.rotation[3] == 1.0f;
+             node.mark.length <= kMaxMarkBytes && node.rotation[3] == 1.0f;
   }
   return false;
 }
@@ -180,13 +179,6 @@ bool idle_fields_are_zero(const BundleParts& parts, const ActionRecord& action) 
                : zero(action.axis) && action.duration == 0.0f && action.degrees == 0.0f);
 }
 
-bool https(std::string_view address) {
-  constexpr std::string_view kStart = "https://";
-  return address.starts_with(kStart) && address.size() > kStart.size() &&
-         address[kStart.size()] != '/' &&
-         address.find_first_of(" \"<>\\^`{|}") == std::string_view::npos;
-}
-
 void check_action(const RecordCheck& check, const BundleParts& parts, const ActionRecord& action,
                   const FaultLog& log) {
   const std::uint64_t before = log.errors();
@@ -209,10 +201,11 @@ void check_action(const RecordCheck& check, const BundleParts& parts, const Acti
   if (!placed || !fits_command(parts, action) || !idle_fields_are_zero(parts, action)) {
     return check.fault(Rule::kAction, &action.source, "a field does not fit event and command");
   }
-  if (action.command == static_cast<std::uint32_t>(ActionCommand::kLink) &&
-      !https(text_of(parts, action.address))) {
-    check.fault(Rule::kActionLink, &action.address, "it has no https:// and host, or a blank");
-  }
+  if (action.command != static_cast<std::uint32_t>(ActionCommand::kLink)) return;
+  const std::string_view address = text_of(parts, action.address);
+  const char* const fault =
+      address.starts_with("https://") ? address_fault(address) : "it has no https://";
+  if (fault != nullptr) check.fault(Rule::kActionLink, &action.address, fault);
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ constexpr std::size_t kLanesOfVector = kVectorBytes / kLaneBytes;
 /// Turns the order of unsigned numbers into that of signed ones.
 constexpr std::int16_t kTopBit = -0x8000;
 using Lanes [[gnu::vector_size(16)]] = std::int16_t;
-/// Sort keys of half floats: infinities and NaN lie at these and beyond.
+/// Sort keys of half floats: infinities and NaN are at these and beyond.
 constexpr std::int16_t kInfinityKey = 0x7C00;
 
 /// (2c + 1)^2 for a byte c that holds a signed number.
@@ -31,7 +31,7 @@ constexpr std::array<std::uint32_t, 256> make_squares() {
   return squares;
 }
 constexpr std::array<std::uint32_t, 256> kSquares = make_squares();
-// (255 * 0.98)^2 and (255 * 1.02)^2, a little inside.
+// Square of the shortest normal, a little inside the limit.
 constexpr std::uint32_t kLeastSquare = 62451;
 constexpr std::uint32_t kGreatestSquare = 67651;
 

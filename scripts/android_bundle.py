@@ -12,8 +12,10 @@ import zipfile
 
 # Abi.AbiAlias
 ABIS = {"armeabi-v7a": 2, "arm64-v8a": 3, "x86": 4, "x86_64": 5}
-# The format as of this version of bundletool, which later ones read.
-BUNDLETOOL = "1.15.0"
+# UncompressNativeLibraries.PageAlignment
+PAGE_ALIGNMENT_16K = 2
+# The format as of this version of bundletool, the first that aligns to 16 KB by default; later ones read it.
+BUNDLETOOL = "1.17.0"
 EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -36,8 +38,8 @@ def number(field, value):
 
 
 def config():
-    """BundleConfig: which bundletool, libraries not compressed, and bundles neither, so that phones map them."""
-    libraries = message(2, number(1, 1))
+    """BundleConfig: the version of bundletool; libraries uncompressed and aligned to 16 KB; bundles uncompressed, to be mapped."""
+    libraries = message(2, number(1, 1) + number(2, PAGE_ALIGNMENT_16K))
     return message(1, message(2, BUNDLETOOL)) + message(2, libraries) + message(3, message(1, "assets/bundles/*.modar"))
 
 

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes what app stores ask for beside the app: scripts/apk.sh --store.
+"""Writes the listing of an app for app stores: scripts/apk.sh --store.
 
   scripts/android_listing.py DIR ICON TITLE ID VERSION_NAME VERSION_CODE RELEASE_URL
 
-The texts say what the app does, which its sources and tests show: the permissions, what is stored, what is sent. Whoever publishes
+The texts say what the app does, which its sources and tests show: the permissions, stored data, sent data. Whoever publishes
 it adds a name and an address, at the places in [brackets].
 """
 import html
@@ -12,8 +12,8 @@ import shutil
 import sys
 
 TITLE_CHARACTERS = 30  # of Google Play
-SHORT = "Point the camera at the picture and see a model standing on it."
-FULL = """Point the phone at one of the pictures that this app knows, and a model stands on it: walk around it, turn it, come closer.
+SHORT = "Point the camera at the picture and see a model on it."
+FULL = """Point the phone at one of the pictures that this app knows, and a model appears on it: walk around it, turn it, come closer.
 Without the picture, look at the models by touch.
 
 The app works without a network, an account or advertisements. The camera's picture is neither stored nor sent.{release}
@@ -31,10 +31,10 @@ PRIVACY = """<!doctype html>
 <p>The app uses the camera to find known pictures and to draw models on them. The camera's pictures are processed on the device. They
 are not stored and not sent, except for photos that you take with the button Picture: these are saved on the device, and you decide
 whether to share them.</p>
-<h2>What is stored on the device</h2>
+<h2>Data on the device</h2>
 <p>The app's content, photos that you take, a measurement of the camera's lens, and a file with technical diagnostics (phone model,
 frame rates, errors). The diagnostics are not sent. All of it but the photos is deleted with the app.</p>
-<h2>What is sent</h2>
+<h2>Data that is sent</h2>
 <p>{network}</p>
 <h2>Others</h2>
 <p>The app contains no advertisements, no analytics and no code of third parties that would collect data. It needs no account.</p>

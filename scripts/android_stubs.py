@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes Java sources that stand for the Android classes that an app names, out of the signatures in
+"""Writes Java sources that replace the Android classes that an app names, out of the signatures in
 Android's own api/current.txt: what android.jar is for a compiler.
 
   scripts/android_stubs.py current.txt APP_SOURCES STUBS

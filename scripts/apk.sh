@@ -5,23 +5,25 @@
 # --title, --id   name of the app on the phone (ModAR), and its application id (org.modar)
 # --key           keystore (PKCS 12) that signs, with its password in APK_PASSWORD (default: a new key, made once
 #                 in build/android/debug.p12). Phones accept updates only from the same key: keep it.
-# --release       address of a folder that `modar ship publish` filled, and the key to trust: adds the network permission
-# --words         words.properties: the texts of the screen, instead of ours in de, el, en, es, fr, it, nl, pl; words-ca.properties: for
+# --release address of a folder that `modar ship publish` filled, and the key to trust: adds the network permission --words
+# words.properties: the texts of the screen, instead of the built-in ones in de, el, en, es, fr, it, nl, pl; words-ca.properties: for
 #                 phones in that language
 # --icon          PNG or JPEG, its middle square (default: the first bundle's hint, else ModAR's)
 # --version-code, --version-name   stores want a higher code each time (default: the number of the newest release at --release,
 #                 else 1 and ModAR's version)
 # --store         what stores ask for: an Android App Bundle, icon and texts of the listing, privacy policy, data safety answers,
 #                 metadata for F-Droid
-# NAME.png or NAME.jpg (the hint) and NAME.properties (texts) next to NAME.modar are included.
-# With ANDROID_NDK set (r25 or newer) it builds the native library for armeabi-v7a, arm64-v8a, x86 and x86_64 (or ANDROID_ABIS), and with
-# --release the installer; without it the APK has no native library, and the script says so. r25 builds for Android 4.4 (API 19)
-# and later, newer ones for 5.0 (API 21): the manifest says which. MODAR_NDK_FLAGS: further words for CMake.
+# NAME.png or NAME.jpg (the hint) and NAME.properties (texts) next to NAME.modar are included. Keypoints of the ModAR paper's method are
+# left out, unless the bundle was baked with --parameters.
+# ANDROID_NDK names the folder of Google's NDK (r25 or newer), which builds the native library for armeabi-v7a, arm64-v8a, x86 and x86_64
+# (or ANDROID_ABIS; "none" is for tests: such an APK starts on no phone), and with --release the installer. r25 builds for Android 4.4
+# (API 19) and later, newer ones for 5.0 (API 21): the manifest says which. MODAR_NDK_FLAGS: further words for CMake.
+# Exit codes: 1 wrong words, 2 a file or the network is missing, 4 a tool failed, 5 a package or the NDK is missing.
 # dx and the signatures of Android's classes come from Debian's source packages, once, into build/android/debian (121 MB).
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 work=$root/build/android
-app=$root/runtime/android
+app=$root/runtime/extensions/android
 
 say() { echo "apk.sh: $*" >&2; }
 stop() { say "$2"; exit "$1"; }
@@ -56,6 +58,14 @@ done
   stop 5 "missing: ${missing[*]}; apt-get install aapt zipalign apksigner android-framework-res default-jdk-headless proguard-cli python3-pil xz-utils"
 framework=/usr/share/android-framework-res/framework-res.apk
 [ -r $framework ] || stop 5 "missing: $framework; apt-get install android-framework-res"
+
+abis=${ANDROID_ABIS:-armeabi-v7a arm64-v8a x86 x86_64}
+if [ "$abis" != none ]; then
+  [ -n "${ANDROID_NDK:-}" ] || stop 5 "ANDROID_NDK is not set: without Google's NDK the app has no native library and starts on no phone;\
+ download NDK r25c from https://developer.android.com/ndk/downloads, unpack it, and export ANDROID_NDK=FOLDER"
+  revision=$(sed -n 's/^Pkg.Revision *= *\([0-9]*\).*/\1/p' "$ANDROID_NDK/source.properties" 2>/dev/null || true)
+  [ "${revision:-0}" -ge 25 ] || stop 5 "ANDROID_NDK: $ANDROID_NDK is no NDK of r25 or newer (its source.properties says '$revision')"
+fi
 
 if [ -n "$release" ] && [ -z "$code" ]; then
   code=$(python3 - "$release/latest" <<'P'
@@ -107,7 +117,7 @@ if [ ! -f "$work/current.txt" ]; then
   mv "$work/current.txt.tmp" "$work/current.txt"
 fi
 
-# The app's code, once for all APKs: compiled beside the stubs, shrunk (to $java/classes), turned into a phone's.
+# The app's code, once for all APKs: compiled with the stubs, shrunk (to $java/classes), turned into a phone's.
 java=$work/code
 made_of=$(cat "$work/current.txt" "$0" "$root/scripts/android_stubs.py" "$app/proguard-rules.pro" "$app/AndroidManifest.xml" \
   "$app"/res/*/* "$app"/java/org/modar/* | sha256sum)
@@ -119,7 +129,7 @@ if [ "$made_of" != "$(cat "$java/made_of" 2>/dev/null)" ]; then
   aapt package -m -J "$java/names" -M "$app/AndroidManifest.xml" -S "$app/res" -I $framework >&2
   find "$app/java" "$java/names" -name '*.java' > "$java/app.list"
   javac "${quick[@]}" --release 7 -d "$java/stub-classes" "@$java/stubs.list"
-  javac "${quick[@]}" -g:none --release 7 -cp "$java/stub-classes" -d "$java/all-classes" "@$java/app.list"
+  javac "${quick[@]/-nowarn/-Xlint:all}" -Werror -g:none --release 7 -cp "$java/stub-classes" -d "$java/all-classes" "@$java/app.list"
   # Java's own classes as the JDK lists them for --release 7. Its lists are in a format newer than ProGuard; what the format
   # added is not in them.
   python3 - "$(dirname "$(dirname "$(readlink -f "$(command -v javac)")")")/lib/ct.sym" "$java/java.jar" <<'P'
@@ -143,7 +153,7 @@ rm -rf "$step"
 mkdir -p "$step/tree/assets/bundles" "$(dirname "$out")"
 cp "$java/classes.dex" "$step/tree/"
 for bundle in "${bundles[@]}"; do
-  cp "$bundle" "$step/tree/assets/bundles/"
+  python3 "$root/scripts/trim_bundle.py" "$bundle" "$step/tree/assets/bundles/$(basename "$bundle")"
   for beside in png jpg properties; do
     [ ! -f "${bundle%.modar}.$beside" ] || cp "${bundle%.modar}.$beside" "$step/tree/assets/bundles/"
   done
@@ -158,13 +168,11 @@ if [ -n "$release" ]; then
   cp "$trust" "$step/tree/assets/release.pub"
 fi
 
-if [ -n "${ANDROID_NDK:-}" ]; then
+if [ "$abis" != none ]; then
   [ -z "$release" ] || "$root/scripts/sources.sh" --libraries || exit $?
   includes=/usr/include/eigen3\;/usr/include
-  revision=$(sed -n 's/^Pkg.Revision *= *\([0-9]*\).*/\1/p' "$ANDROID_NDK/source.properties" 2>/dev/null)
-  [ "${revision:-0}" -ge 25 ] || stop 5 "ANDROID_NDK: $ANDROID_NDK is no NDK of r25 or newer (its source.properties says '$revision')"
   [ "$revision" -lt 26 ] || least=21
-  for abi in ${ANDROID_ABIS:-armeabi-v7a arm64-v8a x86 x86_64}; do
+  for abi in $abis; do
     level=$least
     [[ $abi != *64* ]] || level=21
     # An app that fetches carries the installer and its libraries, out of Debian's sources.
@@ -183,8 +191,6 @@ if [ -n "${ANDROID_NDK:-}" ]; then
     strip=("$ANDROID_NDK"/toolchains/llvm/prebuilt/*/bin/llvm-strip)
     "${strip[0]}" "$step/tree/lib/$abi"/*.so
   done
-else
-  say "ANDROID_NDK is not set: the APK holds no native library and will not start on a phone"
 fi
 
 python3 - "$app" "$step" "$title" "$release" $least "$code" "$name" <<'P'
@@ -207,9 +213,9 @@ P
 if [ -n "$icon" ]; then
   "$root/scripts/android_icon.py" "$icon" "$step/res" "$step/icon.png" || exit 2
 else
-  cp "$root/runtime/web/icon-512.png" "$step/icon.png"
+  cp "$root/runtime/extensions/web/icon-512.png" "$step/icon.png"
 fi
-# Bundles are stored as they are, so that the phone maps them inside the APK.
+# Bundles are stored uncompressed, so that the phone maps them inside the APK.
 aapt package -f -M "$step/AndroidManifest.xml" -S "$step/res" -I $framework --rename-manifest-package "$id" -0 modar \
   -F "$step/unaligned.apk" "$step/tree" >&2
 # 8: a bundle's own alignment; -p lays libraries on pages.

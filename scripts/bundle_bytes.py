@@ -125,9 +125,9 @@ TABLES = {
     69: ("actions", Record("event:I command:I source:I target:I part:N address:N seconds:f duration:f axis:3f degrees:f "
                            "reserved:2I")),
     70: ("media", Record("name:N kind:I flags:I width:I height:I seconds:f poster:I reserved:4I")),
-    67: ("stand_ins", Record("model:I first_chunk:I chunk_count:I reserved:I")),
-    71: ("stand_in_chunks", CHUNK),
-    72: ("stand_in_levels", LEVEL),
+    67: ("proxies", Record("model:I first_chunk:I chunk_count:I reserved:I")),
+    71: ("proxy_chunks", CHUNK),
+    72: ("proxy_levels", LEVEL),
 }
 COLOURS = Record("columns:I rows:I reserved:2I")
 SHAPE = Record("kind:I face_count:I half_arc:d slope:d reserved:2I")
@@ -136,8 +136,8 @@ SHADOW = Record("width:I height:I low:2f high:2f reserved:2I")
 DRAW_ORDER = struct.Struct("<4f2I")
 KEYPOINT = struct.Struct("<5f2i")
 SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}, **{kind: 0 for kind in range(65, 73)}}  # type: flags
-OWNED = {256: 1, 257: 0, 258: 0, 259: 0, 260: 0, 261: 0, 262: 0, 263: 0, 514: 3}
-SINCE = {4: 1, 65: 2, 66: 2, 67: 3, 68: 3, 69: 3, 70: 3, 71: 3, 72: 3, 263: 3, 259: 2, 260: 2, 261: 2, 262: 2}  # type: minor version
+OWNED = {256: 1, 257: 0, 258: 0, 259: 0, 260: 0, 261: 0, 262: 0, 263: 0, 264: 0, 514: 3}
+SINCE = {4: 1, 65: 2, 66: 2, 67: 3, 68: 3, 69: 3, 70: 3, 71: 3, 72: 3, 263: 3, 264: 3, 259: 2, 260: 2, 261: 2, 262: 2}  # type: minor version
 COMPONENTS = {1: "e", 2: "h", 3: "H", 4: "b", 5: "B", 6: "f"}
 
 

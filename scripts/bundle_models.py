@@ -65,38 +65,38 @@ def check_models(bundle):
            "BUNDLE_CHUNK_RANGE")
     for row in tables["models"]:
         check_model(bundle, row)
-    check_stand_ins(bundle)
-    used = sum(2 * level["index_count"] for level in tables["levels"] + tables["stand_in_levels"])
+    check_proxies(bundle)
+    used = sum(2 * level["index_count"] for level in tables["levels"] + tables["proxy_levels"])
     need(used <= len(bundle.indices), "BUNDLE_LEVEL_RANGE", 0, "indices are shared")
 
 
-def check_stand_ins(bundle):
+def check_proxies(bundle):
     """Whole models as one level each, from fine to coarse; their chunks and levels count on from those of models."""
     tables, before = bundle.tables, {}
-    chunks, levels = tables["stand_in_chunks"], tables["stand_in_levels"]
-    follow(tables["stand_ins"], "first_chunk", "chunk_count", len(chunks), "BUNDLE_STAND_IN", len(tables["chunks"]))
-    follow(chunks, "first_level", "level_count", len(levels), "BUNDLE_STAND_IN", len(tables["levels"]))
-    models = [row["model"] for row in tables["stand_ins"]]
-    need(models == sorted(models) and all(m < len(tables["models"]) for m in models), "BUNDLE_STAND_IN", 0, "models")
-    for row in tables["stand_ins"]:
+    chunks, levels = tables["proxy_chunks"], tables["proxy_levels"]
+    follow(tables["proxies"], "first_chunk", "chunk_count", len(chunks), "BUNDLE_PROXY", len(tables["chunks"]))
+    follow(chunks, "first_level", "level_count", len(levels), "BUNDLE_PROXY", len(tables["levels"]))
+    models = [row["model"] for row in tables["proxies"]]
+    need(models == sorted(models) and all(m < len(tables["models"]) for m in models), "BUNDLE_PROXY", 0, "models")
+    for row in tables["proxies"]:
         model = tables["models"][row["model"]]
         materials = range(model["first_material"], model["first_material"] + model["material_count"])
-        mine = stand_in_chunks(tables, row)
+        mine = proxy_chunks(tables, row)
         mine_levels = [levels[chunk["first_level"] - len(tables["levels"])] for chunk in mine]
         need(mine and all(chunk["level_count"] == 1 for chunk in mine) and
-             len({level["error"] for level in mine_levels}) == 1, "BUNDLE_STAND_IN", row["at"], "its levels")
+             len({level["error"] for level in mine_levels}) == 1, "BUNDLE_PROXY", row["at"], "its levels")
         for chunk, level in zip(mine, mine_levels):
             check_chunk(chunk, materials)
             check_level(bundle, model, level)
         now = (-mine_levels[0]["error"], sum(level["index_count"] for level in mine_levels))
         last = before.get(row["model"], now)
-        need(now[0] <= last[0] and now[1] <= last[1], "LEVEL_ORDER", row["at"], "stand-ins")
+        need(now[0] <= last[0] and now[1] <= last[1], "LEVEL_ORDER", row["at"], "proxies")
         before[row["model"]] = now
         check_grid(bundle, model, mine)
 
 
-def stand_in_chunks(tables, row):
-    return tables["stand_in_chunks"][row["first_chunk"] - len(tables["chunks"]):][:row["chunk_count"]]
+def proxy_chunks(tables, row):
+    return tables["proxy_chunks"][row["first_chunk"] - len(tables["chunks"]):][:row["chunk_count"]]
 
 
 def check_model(bundle, model):
@@ -204,7 +204,7 @@ def check_level(bundle, model, level):
 
 
 def decode_attribute(part, raw, chunk):
-    """A list of tuples, one a vertex; `raw` has the values as they are stored."""
+    """A list of tuples, one a vertex; `raw` has the stored values."""
     if part["normalised"]:
         bits = 8 * struct.calcsize(COMPONENTS[part["type"]])
         signed = COMPONENTS[part["type"]] in "bh"

@@ -9,6 +9,14 @@ FOUND, LOST, TAP, AFTER = 1, 2, 3, 4
 PLAY, PAUSE, SHOW, HIDE, TOGGLE, TEXT, LINK, NEXT, TURN = 1, 2, 3, 4, 5, 6, 7, 8, 10
 
 
+UNSEEN = ("\x00- \x7f-\xa0\xad\u034f\u061c\u115f\u1160\u1680\u17b4\u17b5\u180b-\u180f\u2000-\u200f\u2028-\u202f\u205f-\u206f\u2800\u3000\u3164"
+          "\ufe00-\ufe0f\ufeff\uffa0\ufff0-\ufffb\U0001bca0-\U0001bca3\U0001d173-\U0001d17a\U000e0000-\U000e0fff")
+
+
+def is_link(address):
+    return re.fullmatch(r'https://[^@/?#]+([/?#].*)?', address) and not re.search(rf'["<>\\^`{{|}}{UNSEEN}]', address)
+
+
 def unit(parts):
     return abs(sum(part * part for part in parts) - 1) <= 1e-4
 
@@ -64,7 +72,7 @@ def check_action(bundle, row):
     need((model or not row["part"]) and (command == LINK or not row["address"]) and (event == AFTER or not row["seconds"]) and
          (unit(row["axis"]) if command == TURN else not any([*row["axis"], row["duration"], row["degrees"]])),
          "BUNDLE_ACTION", at, "a field of another kind")
-    need(command != LINK or re.fullmatch(r'https://[^/ "<>\\^`{|}][^ "<>\\^`{|}]*', row["address"]), "ACTION_LINK", at)
+    need(command != LINK or is_link(row["address"]), "ACTION_LINK", at)
 
 
 def boxes(data, at, end):
@@ -161,7 +169,7 @@ def check_captions(text):
 
 
 def check_texts(bundle):
-    """Each label has a title, and what is heard has captions, in every language in which one has."""
+    """Each label has a title, and each sound has captions, in every language in which one has."""
     told = json.loads(bundle.payload.get((2, NONE, 0), b"{}")).get("nodes", [])
 
     def languages(key, row):

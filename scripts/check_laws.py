@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Holds the tree against the laws of the house (CONTRIBUTING.md): who may include whom, what the
-player may link, what lies at the top level.
+"""Holds the tree against the laws of the house (CONTRIBUTING.md): who may include whom, what the player may link, the top level's contents.
 
   scripts/check_laws.py [--root DIR] [--player FILE]
   scripts/check_laws.py --rooms
@@ -21,8 +20,8 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)
 
 # Header prefixes of third parties and the files that may include them (Law 4).
 OPENCV_FILES = (
-    r"bake/(pattern|lab)/.*\.cpp", r"bake/pattern/gray_mat\.hpp",
-    r"runtime/paper/.*\.(cpp|hpp)", r"runtime/play/desk_.*\.cpp", r"tests/.*",
+    r"bake/pattern/.*\.cpp", r"bake/extensions/lab/.*\.cpp", r"bake/pattern/gray_mat\.hpp",
+    r"runtime/opencv/.*\.(cpp|hpp)", r"runtime/extensions/paper/.*\.cpp", r"runtime/play/desk_.*\.cpp", r"tests/.*",
 )
 THIRD_PARTIES = {
     "opencv2/": OPENCV_FILES,
@@ -33,26 +32,26 @@ THIRD_PARTIES = {
     "bake/import/gltf/tinygltf_library": (r"bake/(import/gltf|export)/[a-z_]*gl(b|tf)[a-z_]*\.cpp",),
     "toml++/": (r"bake/project/project_file\.cpp",),
     "CLI/": (r"bake/commands/command_line\.cpp",),
-    "nlohmann/": (r"bake/json\.cpp", r"bake/check/device/device_file_json\.cpp", r"tests/.*"),
+    "nlohmann/": (r"bake/json\.cpp", r"tests/.*"),
     "rapidjson/": (r"runtime/play/(frame_report|recording)\.cpp",
                    r"runtime/fetch/(main|release|store)\.cpp", r"tests/.*"),
     "sodium.h": (r"runtime/fetch/release\.cpp", r"bake/ship/keys/keys\.cpp"),
     "zstd.h": (r"runtime/fetch/piece\.cpp",
-               r"bake/ship/(mesh_encoder|recipe_maker)\.cpp", r"bake/lab/ship_bench\.cpp", r"tests/.*"),
+               r"bake/ship/(mesh_encoder|recipe_maker)\.cpp", r"bake/extensions/lab/ship_bench\.cpp", r"tests/.*"),
     "meshoptimizer": (r"runtime/fetch/piece\.cpp",
                       r"bake/import/gltf/gltf_meshopt\.cpp", r"bake/mesh/lod/reduce\.cpp", r"bake/ship/mesh_encoder\.cpp",
-                      r"bake/lab/(lod_bench|meshopt_peer|ship_bench)\.cpp", r"tests/.*"),
-    "assimp/": (r"bake/lab/assimp_peer\.cpp", r"tests/mesh/assimp_oracle\.cpp"),
-    "tiny_obj_loader": (r"bake/lab/tinyobj_library\.hpp",),
-    "bake/lab/tinyobj_library": (r"bake/lab/tinyobj_peer\.cpp", r"tests/import/tiny_obj\.cpp"),
+                      r"bake/extensions/lab/(lod_bench|meshopt_peer|ship_bench)\.cpp", r"tests/.*"),
+    "assimp/": (r"bake/extensions/lab/assimp_peer\.cpp", r"tests/mesh/assimp_oracle\.cpp"),
+    "tiny_obj_loader": (r"bake/extensions/lab/tinyobj_library\.hpp",),
+    "bake/extensions/lab/tinyobj_library": (r"bake/extensions/lab/tinyobj_peer\.cpp", r"tests/import/tiny_obj\.cpp"),
     "curl/": (r"runtime/fetch/curl_downloader\.cpp",),
-    "httplib.h": (r"bake/web/(http_reader|serve)\.cpp", r"bake/studio/server\.cpp"),
-    "openssl/": (r"bake/web/serve\.cpp",),
-    "qrencode.h": (r"bake/web/serve\.cpp",),
+    "httplib.h": (r"bake/ship/http/http_reader\.cpp", r"bake/extensions/web/serve\.cpp", r"bake/extensions/studio/server\.cpp"),
+    "openssl/": (r"bake/extensions/web/serve\.cpp",),
+    "qrencode.h": (r"bake/extensions/web/serve\.cpp",),
     "SDL": (r"runtime/play/desk_.*\.cpp", r"tests/.*"),
     "png.h": (r"bake/image/png\.cpp",),
     "zlib.h": (r"bake/export/usdz_writer\.cpp",),
-    "minizip/": (r"bake/studio/archive\.cpp",),
+    "minizip/": (r"bake/extensions/studio/archive\.cpp",),
     "jpeglib.h": (r"bake/image/jpeg\.cpp",),
     "jerror.h": (r"bake/image/jpeg\.cpp",),
     "webp/": (r"bake/image/webp\.cpp",),
@@ -64,9 +63,9 @@ THIRD_PARTIES = {
 BANNED_ON_DEVICE = {"iostream", "fstream", "sstream", "ostream", "istream", "iomanip", "filesystem",
                     "locale", "regex", "codecvt"}
 # Of the lab, what looks into the renderer.
-INSIDE = (r"bake/lab/(render_bench|plain_shading)\.cpp",)
+INSIDE = (r"bake/extensions/lab/(render_bench|plain_shading)\.cpp",)
 # Files of the runtime that a phone never builds.
-DESK = (r"runtime/paper/.*", r"runtime/play/desk_.*")
+DESK = (r"runtime/opencv/.*", r"runtime/extensions/paper/.*", r"runtime/play/desk_.*")
 TOP_LEVEL = {"bake", "runtime", "formats", "shaders", "assets", "tests", "scripts", "CMakeLists.txt",
              "CMakePresets.json", "README.md", "LICENSE", "CHANGELOG.md", "CONTRIBUTING.md",
              "ISSUES.md"}
@@ -87,10 +86,12 @@ def standard_header(name):
 
 # Rooms of the workstation from the bottom up: each includes those before it, and of its own rank itself only.
 BAKE_ROOMS = (("bake/process",), ("bake", "bake/memory"), ("bake/io",), ("bake/image",), ("bake/import", "bake/video"), ("bake/mesh",),
-              ("bake/texture", "bake/pattern"), ("bake/options",), ("bake/bundle", "bake/export", "bake/ship"), ("bake/web",), ("bake/check",), ("bake/page", "bake/project"), ("bake/studio",), ("bake/commands",), ("bake/lab",))
+              ("bake/texture", "bake/pattern"), ("bake/options",), ("bake/bundle", "bake/export", "bake/ship"),
+              ("bake/check",), ("bake/project",), ("bake/commands",), ("bake/extensions/web", "bake/extensions/report"), ("bake/extensions/studio",), ("bake/extensions/lab",))
 RANK = {room: rank for rank, rooms in enumerate(BAKE_ROOMS) for room in rooms}
-# The doors of the rooms: the headers that other rooms may include. Those of bake/memory and below are for all. The lab measures
-# what lies inside, and may include everything below it; what it alone includes is no door.
+# The doors of the rooms: the headers that other rooms may include. Those of bake/memory and below
+# are for all. The lab measures the inside, and may include everything below it; what it alone
+# includes is no door.
 DOORS = {
     "bake": ("json.hpp", "report.hpp", "up_axis.hpp"),
     "bake/io": ("input.hpp", "output.hpp", "terminal.hpp"),
@@ -108,23 +109,26 @@ DOORS = {
     "bake/texture": ("texture.hpp", "texture_codec.hpp", "texture_stage.hpp"),
     "bake/texture/atlas": ("atlas.hpp",),
     "bake/texture/relief": ("relief.hpp",),
-    "bake/pattern": ("pattern.hpp", "alike_patterns.hpp"),
+    "bake/pattern": ("pattern.hpp", "alike_patterns.hpp", "score.hpp"),
     "bake/options": ("request.hpp", "request_text.hpp", "options.hpp"),
     "bake/bundle": ("bundle_builder.hpp", "bundle_json.hpp", "link_bundles.hpp"),
+    "bake/bundle/files": ("sorted_files.hpp",),
     "bake/bundle/scene": ("scene_placement.hpp", "scene_nodes.hpp", "scene_shadow.hpp"),
     "bake/export": ("extract.hpp", "model_file.hpp", "room_models.hpp"),
     "bake/ship": ("publish.hpp", "release_folder.hpp", "verify_release.hpp"),
+    "bake/ship/http": ("http_reader.hpp",),
     "bake/ship/keys": ("keys.hpp", "root_draft.hpp"),
-    "bake/web": ("site.hpp", "serve.hpp", "http_reader.hpp"),
+    "bake/extensions/web": ("site.hpp", "serve.hpp"),
     "bake/check": ("verdict.hpp", "text_check.hpp"),
+    "bake/check/content": ("content_check.hpp",),
     "bake/check/device": ("device_rules.hpp", "device_file.hpp"),
     "bake/check/source": ("source_check.hpp", "reproduce.hpp"),
     "bake/check/picture": ("visual_check.hpp", "pose_check.hpp"),
-    "bake/page": ("report_page.hpp", "model_pictures.hpp"),
+    "bake/extensions/report": ("model_pictures.hpp",),
     "bake/project": ("project.hpp", "project_edit.hpp"),
-    "bake/studio": ("studio.hpp",),
-    "bake/commands": ("command_line.hpp",),
-    "bake/lab": (),
+    "bake/extensions/studio": (),
+    "bake/commands": ("command_line.hpp", "commands.hpp"),
+    "bake/extensions/lab": (),
     # Of the runtime, apps and rooms come through runtime/include and runtime/fetch/include.
     "runtime/platform": ("command_line.hpp", "lap_clock.hpp", "semaphore.hpp"),
     "runtime/platform/gl": ("extension_list.hpp",),
@@ -132,13 +136,16 @@ DOORS = {
     "runtime/record": (),
     "runtime/arrive": (),
     "runtime/render": (),
-    "runtime/paper": (),
+    "runtime/opencv": ("features.hpp", "opencv_bridge.hpp"),
+    "runtime/extensions/paper": (),
     "runtime/play": (),
     "runtime/capi": (),
     "runtime/fetch": (),
-    "runtime/android": (),
-    "runtime/web": (),
+    "runtime/extensions/android": (),
+    "runtime/extensions/web": (),
 }
+# Extensions, each with an option of CMake: only extensions and tests include them.
+EXTENSIONS = ("bake/extensions/web", "bake/extensions/report", "bake/extensions/studio", "bake/extensions/lab", "runtime/extensions/paper", "runtime/extensions/web", "runtime/extensions/android")
 # Larger rooms are divided rather than given more doors.
 MOST_DOORS = 3
 
@@ -147,7 +154,7 @@ def bake_room(path):
     """"bake/pattern/a.cpp" -> "bake/pattern", "bake/mesh/weld/a.cpp" -> "bake/mesh/weld", which is a room within bake/mesh;
     a file right under bake/ is of "bake"."""
     parts = path.split("/")
-    if "/".join(parts[:3]) in DOORS:
+    if "/".join(parts[:3]) in DOORS or parts[1:2] == ["extensions"]:
         return "/".join(parts[:3])
     return "/".join(parts[:2]) if len(parts) > 2 else parts[0]
 
@@ -155,7 +162,7 @@ def bake_room(path):
 def door_violations(path, name):
     """Of a room's header that is no door of it, included by another room; tests and the lab look inside."""
     here, there = bake_room(path), bake_room(name)
-    if here == there or name.split("/")[0] not in ("bake", "runtime") or path.startswith(("tests/", "bake/lab/")):
+    if here == there or name.split("/")[0] not in ("bake", "runtime") or path.startswith(("tests/", "bake/extensions/lab/")):
         return
     if here.count("/") == 2 and here.rsplit("/", 1)[0] == there:  # a room within a room knows it
         return
@@ -199,8 +206,8 @@ def print_rooms(root):
 
 
 def house_of(room):
-    """"bake/mesh/weld" -> "bake/mesh"; rooms that lie in no other are their own, and so is bake/io."""
-    return "/".join(room.split("/")[:2])
+    """"bake/mesh/weld" -> "bake/mesh"; rooms in no other are their own, and so is bake/io."""
+    return room if "/extensions/" in room else "/".join(room.split("/")[:2])
 
 
 def room_violations(path, name):
@@ -210,14 +217,21 @@ def room_violations(path, name):
     if there not in RANK or here not in RANK:
         yield f"{there if there not in RANK else here} is no room of BAKE_ROOMS"
     elif RANK[there] >= RANK[here]:
-        yield f"{here} lies below {there}, but includes '{name}'"
+        yield f"{here} is below {there}, but includes '{name}'"
+
+
+def extension_violations(path, name):
+    there = next((room for room in EXTENSIONS if name.startswith(room + "/")), None)
+    if there and not path.startswith(("tests/", *(room + "/" for room in EXTENSIONS))):
+        yield f"the core includes '{name}' of the extension {there}"
 
 
 def include_violations(path, name):
-    """Yields what is wrong with file `path` including `name`."""
+    """Yields the faults of file `path` including `name`."""
     room = path.split("/")[0]
     yield from room_violations(path, name)
     yield from door_violations(path, name)
+    yield from extension_violations(path, name)
     for prefix, allowed in THIRD_PARTIES.items():
         if name.startswith(prefix) and not matches(path, allowed):
             yield f"'{name}' may be included by {', '.join(allowed)} only"

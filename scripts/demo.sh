@@ -1,71 +1,25 @@
 #!/usr/bin/env bash
 # First light: bakes a model and a pattern, checks the bundle, plays a video with the model on it.
-#   scripts/demo.sh          a jar on the box of a real hand-held video (Debian's opencv-doc)
-#   scripts/demo.sh --web    the same as a page for browsers in out/web (Debian's emscripten compiles its engine)
-#   scripts/demo.sh --own    the jar on a book's cover, in a clip that it renders: needs no package but the build's
+#   scripts/demo.sh          a jar on the box of a real hand-held video (Debian's opencv-doc), and as a page for browsers
+#   scripts/demo.sh --own    the jar on a book's cover, in a clip that it renders, and no page: needs no package but the build's
 # Leaves everything in out/demo (out/demo-own) and prints where to look; the output of the programs goes to build/demo.log.
+# The programs stay in build/release/bin and the page's engine in build/web, where scripts/release.sh takes them.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
 
 own=no
-web=no
 case ${1:-} in
   "") ;;
   --own) own=yes ;;
-  --web) web=yes ;;
-  -h | --help) sed -n '2,6s/^# \{0,1\}//p' "$0"; exit 0 ;;
+  -h | --help) sed -n '2,7s/^# \{0,1\}//p' "$0"; exit 0 ;;
   *) echo "demo.sh: unknown option '$1'; try --help" >&2; exit 1 ;;
 esac
 
-mkdir -p build
 log=build/demo.log
-: >"$log"
-steps=6
-at=0
-watcher=
-trap '[ -z "$watcher" ] || kill "$watcher" 2>/dev/null' EXIT
-step() {  # WHAT COMMAND...: one line with its seconds; on a terminal, also how far a build is
-  at=$((at + 1))
-  local what=$1 start=$SECONDS status=0
-  shift
-  printf '%d/%d  %-62s ' $at $steps "$what"
-  echo "== $what" >>"$log"
-  if [ -t 1 ]; then
-    (while sleep 1; do
-      printf '\r%d/%d  %-62s %4d s %-12s' $at $steps "$what" $((SECONDS - start)) \
-        "$(tail -n 1 "$log" | sed -n 's/^\(\[[0-9]*\/[0-9]*\]\).*/\1/p')"
-    done) &
-    watcher=$!
-  fi
-  "$@" >>"$log" 2>&1 || status=$?
-  if [ -n "$watcher" ]; then
-    kill "$watcher"; wait "$watcher" 2>/dev/null || true
-    watcher=
-    printf '\r%d/%d  %-62s ' $at $steps "$what"
-  fi
-  if [ $status -ne 0 ]; then
-    printf 'failed\n'
-    tail -n 25 "$log" >&2
-    echo "demo.sh: the whole log is $root/$log" >&2
-    exit $status
-  fi
-  printf '%4d s %-12s\n' $((SECONDS - start)) ""
-}
-
-# The path of a file of an installed package; where the machine installs no documentation, the package
-# is unpacked into build/packages instead.
-package_file() {
-  local package=$1 path=$2
-  if [ -r "$path" ]; then echo "$path"; return; fi
-  local unpacked=build/packages/$package
-  if [ ! -r "$unpacked$path" ]; then
-    mkdir -p "$unpacked"
-    (cd "$unpacked" && apt-get download -qq "$package" >&2)
-    dpkg -x "$unpacked"/"$package"_*.deb "$unpacked"
-  fi
-  echo "$unpacked$path"
-}
+steps=$([ $own = yes ] && echo 6 || echo 8)
+# shellcheck source=scripts/steps.sh
+. scripts/steps.sh
 
 bin=build/release/bin
 model=assets/models/pottery.obj
@@ -85,12 +39,17 @@ fi
 bundle=$out/demo.modar
 
 packages() {
-  if [ $own = yes ]; then scripts/setup.sh; elif [ $web = yes ]; then scripts/setup.sh demo web; else scripts/setup.sh demo; fi
+  if [ $own = yes ]; then scripts/setup.sh; else scripts/setup.sh demo web; fi
 }
 
 build() {
-  cmake --preset release
-  cmake --build --preset release --target modar modar-play modar-lab
+  cmake --preset package
+  ninja -C build/release modar modar-play modar-fetch modar-lab
+}
+
+engine() {
+  cmake --preset web
+  cmake --build --preset web
 }
 
 make_pattern() {
@@ -106,7 +65,7 @@ make_pattern() {
   # The corners as read off the photo in an image viewer; the box's front is 258 x 189 mm.
   "$bin/modar" pattern rectify "$out/photo.png" \
     --corners 285.8,111.2,513.6,168.7,473.3,282.6,200.8,195.6 \
-    --width-mm 258 --height-mm 189 -o "$pattern"
+    --width 258mm --height 189mm -o "$pattern"
 }
 
 check() {
@@ -115,16 +74,10 @@ check() {
   "$bin/modar" report "$bundle" -o "$out/report.html"
 }
 
-page() {
-  cmake --preset web
-  cmake --build --preset web
-  "$bin/modar" web "$bundle" -o out/web --title "A jar on a box"
-}
-
 play() {
   # --force: the folder holds the video, too.
   "$bin/modar-play" "$bundle" --input "$video" --report "$out" --force
-  # Three frames with plain shading, as it is drawn, and in the light that the camera shows.
+  # Three frames with plain shading, as drawn, and in the light that the camera shows.
   mkdir "$out/frames"
   if [ $own = yes ]; then
     for frame in 05 30 55; do cp "$video/frame_000$frame.png" "$out/frames"; done
@@ -138,8 +91,9 @@ play() {
 }
 
 echo "ModAR: a jar is baked onto a picture, and played on a video. The output of the programs goes to $log."
-step "packages of Debian (about 1.4 GB of disk, the first time)" packages
-step "building modar, modar-play and modar-lab (minutes, the first time)" build
+step "packages of Debian (about 3.2 GB of disk, the first time)" packages
+step "building the programs (minutes, the first time)" build
+[ $own = yes ] || step "building the page's engine (minutes, the first time)" engine
 if [ $own = yes ]; then
   step "the picture: a book's cover; a clip of it" make_pattern
 else
@@ -150,17 +104,11 @@ step "modar bake: model and picture become one file" \
 step "modar check, modar report" check
 size=$(($(stat -c %s "$bundle") / 1024))
 
-if [ $web = yes ]; then
-  step "modar web: the page, and its engine (minutes, the first time)" page
-  cat <<END
-Made in $((SECONDS / 60)) min $((SECONDS % 60)) s: $root/out/web, a page with a bundle of $size KB. Open it
-  here:        python3 -m http.server --bind 127.0.0.1 --directory $root/out/web   (http://localhost:8000)
-  on a phone:  $root/$bin/modar web $root/$bundle -o $root/out/web --title 'A jar on a box' --serve
-END
-  exit
-fi
-
 step "modar-play: finds the picture in each frame, draws the jar" play
+if [ $own = no ]; then
+  step "modar web: the page" "$bin/modar" web "$bundle" -o $out/site --title "A jar on a box"
+  [ -s $out/site/index.html ]
+fi
 for file in index.html overlay.mp4 poster.png contact_sheet.png before_after.png report.html demo.modar; do
   [ -s "$out/$file" ] || { echo "demo.sh: $out/$file was not made" >&2; exit 4; }
 done
@@ -171,5 +119,10 @@ Made in $((SECONDS / 60)) min $((SECONDS % 60)) s, in $root/$out. Look at
   index.html    the video with the jar, and what became of each frame
   report.html   what is in the bundle of $size KB, demo.modar, and what each phone says to it
   poster.png, overlay.mp4, contact_sheet.png, before_after.png   the pictures alone
-Next: your own model on your own picture, see README.md.
+Next: your own model on your own picture, see README.md. The programs are in build/release/bin:
+  export PATH=$root/$bin:\$PATH
+END
+[ $own = yes ] || cat <<END
+The jar on a phone in the same network, by a QR code:
+  $bin/modar web $bundle -o $out/site --title 'A jar on a box' --serve
 END

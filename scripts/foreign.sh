@@ -6,7 +6,7 @@
 #                                                      of modar web, which ARM unpacks to the same bytes
 #   scripts/foreign.sh memory BUNDLE                   tracks and draws BUNDLE here within 256 MB of addresses, by the
 #                                                      device's code and a driver that draws nothing: memory a stage
-#   scripts/foreign.sh budget [MODAR [BIG_BUNDLE]]     instructions on ARMv7, beside tests/bench/arm_budget.csv; fails
+#   scripts/foreign.sh budget [MODAR [BIG_BUNDLE]]     instructions on ARMv7, compared with tests/bench/arm_budget.csv; fails
 #                                                      where one is 2 % above. MODAR: program that bakes the demo scene
 #                                                      (build/release/bin/modar); BIG_BUNDLE: of about 200 MB
 # Needs ffmpeg (not for the budget) and: g++-arm-linux-gnueabihf or g++-aarch64-linux-gnu with qemu-user,
@@ -130,7 +130,7 @@ count() { # STEP BUNDLE FRAMES SKIP
     awk '{ all[NR] = $1 } END { print all[int((NR + 1) / 2)], all[NR] }'
 }
 
-measure() { # NAME STEP BUNDLE FRAMES SKIP [worst]: prints a row beside the committed one; worst: of the greatest
+measure() { # NAME STEP BUNDLE FRAMES SKIP [worst]: prints a row with the committed one; worst: of the greatest
   figures=$(count "$2" "$3" "$4" "$5")
   median=${figures% *} most=${figures#* }
   if [ "${6:-}" = worst ]; then now=$most; else now=$median; fi

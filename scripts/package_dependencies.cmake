@@ -1,13 +1,8 @@
 # Read by cpack, before it makes packages: what the programs in the build folder depend on, by dpkg-shlibdeps. What
-# they load when a video is opened is recommended and not required: OpenCV's codecs alone bring 380 MB.
+# they load when a video is opened is recommended and not required: OpenCV's codecs alone need 380 MB.
 # The same sources give the same bytes: files are as old as the last commit.
-if("$ENV{SOURCE_DATE_EPOCH}" STREQUAL "")
-  execute_process(COMMAND git log -1 --format=%ct WORKING_DIRECTORY ${CMAKE_CURRENT_LIST_DIR}
-    OUTPUT_VARIABLE committed OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
-  if(committed)
-    set(ENV{SOURCE_DATE_EPOCH} ${committed})
-  endif()
-endif()
+include(${CMAKE_CURRENT_LIST_DIR}/commit_time.cmake)
+set(ENV{SOURCE_DATE_EPOCH} ${MODAR_COMMIT_TIME})
 set(binary ${CPACK_PACKAGE_DIRECTORY}/../bin)
 set(loaded ${CPACK_PACKAGE_DIRECTORY}/../libexec/modar)
 set(work ${CPACK_PACKAGE_DIRECTORY}/shlibdeps)

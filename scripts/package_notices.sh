@@ -24,7 +24,7 @@ ninja -C "$build" -t inputs modar modar-play modar-fetch modar-lab modar_media m
 # The C library and the compiler's own come from the system that runs the binaries, or by their exception need no notice.
 xargs -r dpkg -S <"$out/files" 2>/dev/null | sed 's/: .*//; s/, .*//; s/:.*//' | sort -u |
   grep -vE '^(libc6-dev|linux-libc-dev|libstdc\+\+-|libgcc-|libcrypt-dev)' >"$out/packages"
-[ -s "$out/packages" ] || { echo "package_notices.sh: nothing is known of what was compiled in $build" >&2; exit 4; }
+[ -s "$out/packages" ] || { echo "package_notices.sh: nothing is known of the build in $build" >&2; exit 4; }
 
 {
   cat <<'END'
@@ -39,8 +39,7 @@ END
   Universal; on Debian systems its text is in /usr/share/common-licenses/CC0-1.0.
 
 2. Code of others
-  These Debian packages' headers were compiled, or their archives linked, when ModAR was built. Their notices follow as they stand
-  in these packages.
+  These Debian packages' headers were compiled, or their archives linked, when ModAR was built. Their notices follow as in these packages.
 END
   n=0
   while read -r package; do
@@ -61,6 +60,6 @@ END
 rm -f "$out/sums" "$out/inputs" "$out/files" "$out/packages"
 mv "$out/copyright.new" "$out/copyright"
 
-date=$(LC_ALL=C date -u -R -d "@${SOURCE_DATE_EPOCH:-$(git -C "$root" log -1 --format=%ct 2>/dev/null || echo 0)}")
+date=$(LC_ALL=C date -u -R -d "@$SOURCE_DATE_EPOCH")
 printf 'modar (%s) unstable; urgency=medium\n\n  * See /usr/share/doc/modar/CHANGELOG.md.gz in the package modar.\n\n -- The ModAR maintainers <%s>  %s\n' \
   "$version" "${MODAR_MAINTAINER_MAIL:-maintainers@modar.invalid}" "$date" | gzip -9n >"$out/changelog.gz"

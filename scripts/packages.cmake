@@ -8,6 +8,7 @@ if(MODAR_PACKAGES)
   set(laboratory_share ${CMAKE_BINARY_DIR}/laboratory-share)
   set(page -DFOLDER=${player_share} -P ${CMAKE_CURRENT_LIST_DIR}/manual_page.cmake)
   add_custom_command(OUTPUT ${share}/man/man1/modar.1.gz ${player_share}/man/man1/modar-play.1.gz
+    COMMAND ${CMAKE_COMMAND} -E rm -rf ${share} ${player_share} ${laboratory_share}  # pages of commands that are no more
     COMMAND modar document -o ${share}
     COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:modar-play> ${page}
     COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:modar-fetch> ${page}
@@ -22,9 +23,10 @@ if(MODAR_PACKAGES)
     COMMAND ffmpeg -v error -y -framerate 15 -pattern_type glob -i "${clip}/*.png" -pix_fmt yuv420p
       -threads 1 -fflags +bitexact -flags:v +bitexact ${clip}/clip.mp4
     VERBATIM)
-  # The licences, ours and of what is inside the binaries.
+  # The licences, ours and of libraries inside the binaries.
   set(notices ${CMAKE_BINARY_DIR}/notices)
-  add_custom_target(modar_notices COMMAND ${CMAKE_CURRENT_LIST_DIR}/package_notices.sh ${CMAKE_BINARY_DIR} ${notices} ${PROJECT_VERSION}
+  add_custom_target(modar_notices COMMAND ${CMAKE_COMMAND} -E env SOURCE_DATE_EPOCH=${MODAR_COMMIT_TIME}
+      ${CMAKE_CURRENT_LIST_DIR}/package_notices.sh ${CMAKE_BINARY_DIR} ${notices} ${PROJECT_VERSION}
     COMMAND sh -c "gzip -9nc '${CMAKE_SOURCE_DIR}/CHANGELOG.md' > '${notices}/CHANGELOG.md.gz'" VERBATIM)
   add_dependencies(modar_notices modar modar-play modar-fetch modar-lab modar_media modar_video_library modar_shared modar_runtime
     modar_formats modar_fetch)

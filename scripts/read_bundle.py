@@ -2,18 +2,20 @@
 """Reads and checks a ModAR bundle, written from formats/bundle.md alone: a second opinion on ours.
 
 Usage: read_bundle.py FILE... [--json] [--full] [--scenes]
-  --json  print what was decoded of one file; --full adds every position, normal, uv, colour, index
-  --scenes  print a line for each file: a digest of the scene that was decoded, or why there is none
+  --json  print the decoded content of one file; --full adds every position, normal, uv, colour, index
+  --scenes  print a line for each file: a digest of the decoded scene, or the reason of its absence
 Exit: 0 good, 1 usage, 2 a file cannot be read, 3 a bundle is invalid or unsupported.
 """
+import base64
 import json
 import math
+import re
 import struct
 import sys
 
 from bundle_bytes import (COLOURS, DRAW_ORDER, FACE, FEATURES, KEYPOINT, NO_OFFSET, NONE, SHADOW, SHAPE, Bundle, Fault, at_least,
                           digest, flags_known, follow, need)
-from bundle_models import check_models, check_tight, decode_level, stand_in_chunks
+from bundle_models import check_models, check_tight, decode_level, proxy_chunks
 from bundle_nodes import check_nodes
 from bundle_summary import check_summary
 
@@ -192,6 +194,10 @@ def read_features(bundle):
             read_shape(bundle, owner, variant, data)
         if kind == 262:
             read_draw_order(bundle, owner, variant, data)
+        if kind == 264:
+            need(owner < len(tables["patterns"]) and variant == 0, "BUNDLE_SECTION_OWNER", 0)
+            need(data[:4] == b"RIFF" and data[8:12] == b"WEBP" and 12 < len(data) <= 32768 and
+                 int.from_bytes(data[4:8], "little") == len(data) - 8, "BUNDLE_PATTERN", 0, "a picture")
         if kind in (256, 257):
             need(owner < len(tables["patterns"]) and variant in sets, "BUNDLE_SECTION_OWNER", 0)
         if kind == 258:
@@ -200,11 +206,37 @@ def read_features(bundle):
         if kind == 257:
             need((256, owner, variant) in bundle.payload and data.startswith(b"%YAML:1.0"),
                  "FEATURE_TEXT", 0)
+            compare_text(data, bundle.payload[256, owner, variant])
         if kind == 256:
             text = bundle.payload.get((257, owner, variant))
             out.append(read_twin(bundle, tables["patterns"][owner], sets[variant], data))
             out[-1].update(pattern=owner, set_id=variant, yml=digest(text) if text else None)
     return out
+
+
+def read_text(text):
+    """Keypoints and descriptors of a feature text, as the bytes of a feature twin."""
+    head, _, matrix = text.decode("ascii").partition("descriptors: !!opencv-matrix\n")
+    rows = [row.split(",") for row in re.findall(r"^ *- *\[([^\]]*)\]", head, re.MULTILINE)]
+    keypoints = b"".join(KEYPOINT.pack(*map(float, row[:5]), *map(int, row[5:])) for row in rows)
+    sides = [int(re.search(rf"^ *{name}: *(\d+)$", matrix, re.MULTILINE)[1]) for name in ("rows", "cols")]
+    data = matrix.partition("data: ")[2]
+    if data.startswith("!!binary |\n"):
+        raw = base64.b64decode("".join(data[10:].split()), validate=True)
+        descriptors = raw[24:] if raw[:24] == b"1u".ljust(24) else None
+    else:
+        descriptors = bytes(int(value) for value in data.strip(" []\n").split(",") if value)
+    return keypoints, descriptors if len(descriptors) == sides[0] * sides[1] and sides[0] == len(rows) else None
+
+
+def compare_text(text, twin):
+    head = FEATURES.decode(twin, 0)
+    try:
+        found = read_text(text)
+    except (ValueError, TypeError, struct.error, OverflowError):
+        found = None
+    told = twin[32:32 + 28 * head["count"]], twin[head["descriptors_offset"]:]
+    need(found == told, "PATTERN_YML_DIFFERS", 0, "text and twin")
 
 
 def read_loop_record(data, pattern):
@@ -261,10 +293,10 @@ def check(bundle, full):
             for level in tables["levels"][chunk["first_level"]:][:chunk["level_count"]]:
                 level.update(decode_level(bundle, layout, chunk, level, full))
             check_tight(chunk, tables["levels"][chunk["first_level"]:][:chunk["level_count"]])
-    for row in tables["stand_ins"]:
+    for row in tables["proxies"]:
         layout = tables["layouts"][tables["models"][row["model"]]["layout"]]
-        for chunk in stand_in_chunks(tables, row):
-            level = tables["stand_in_levels"][chunk["first_level"] - len(tables["levels"])]
+        for chunk in proxy_chunks(tables, row):
+            level = tables["proxy_levels"][chunk["first_level"] - len(tables["levels"])]
             level.update(decode_level(bundle, layout, chunk, level, full))
             check_tight(chunk, [level])
     for row in (row for rows in [bundle.sections, *tables.values()] for row in rows):
@@ -277,15 +309,15 @@ def check(bundle, full):
 
 
 def scene_digest(bundle, decoded):
-    """Of everything that is drawn or recognised: not of where it lies in the file or how it was made."""
+    """Of everything that is drawn or recognised: not of its place in the file or how it was made."""
     scene = {key: value for key, value in decoded.items() if key not in ("bytes", "meta", "sections")}
-    looks = {f"{kind} {owner}": digest(data) for (kind, owner, _), data in bundle.payload.items() if 258 <= kind <= 263}
+    looks = {f"{kind} {owner}": digest(data) for (kind, owner, _), data in bundle.payload.items() if 258 <= kind <= 264}
     scene.update(looks=looks, shades=bundle.shades)
     return digest(json.dumps(scene, sort_keys=True).encode())
 
 
 def read(path, full):
-    """The bundle, what was decoded of it, and an exit code with words where that fails."""
+    """The bundle, its decoded content, and an exit code with words where that fails."""
     try:
         with open(path, "rb") as file:
             bundle = Bundle(file.read())

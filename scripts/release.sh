@@ -11,7 +11,8 @@
 #   SHA256SUMS             of all of these; with --key SHA256SUMS.minisig, by that secret key of minisign
 # --twice: builds the packages and the engine a second time, in another folder, and fails where a byte differs. Machines with
 # other versions of Debian's packages differ in the copyright files alone, which name these.
-# Only what is committed goes in. Takes 12 minutes on two cores, and 3 GB of disk; --twice takes 20.
+# Only committed files go in. Builds in build/release and build/web, as scripts/demo.sh does. Takes 12 minutes on two cores, and
+# 4 GB of disk; --twice takes 20.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
@@ -20,66 +21,46 @@ while [ $# -gt 0 ]; do
   case $1 in
     --key | --out) [ $# -ge 2 ] || { echo "release.sh: $1 needs a value" >&2; exit 1; }; printf -v "${1#--}" %s "$2"; shift ;;
     --twice) twice=yes ;;
-    -h | --help) sed -n '2,15s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    -h | --help) sed -n '2,16s/^# \{0,1\}//p' "$0"; exit 0 ;;
     *) echo "release.sh: unknown option '$1'; try --help" >&2; exit 1 ;;
   esac
   shift
 done
 [ -z "$key" ] || [ -r "$key" ] || { echo "release.sh: $key cannot be read" >&2; exit 2; }
-[ -z "$(git status --porcelain --untracked-files=no)" ] || { echo "release.sh: commit your changes first" >&2; exit 1; }
+mapfile -t committed < <(git ls-tree --name-only HEAD)
+[ -z "$(git status --porcelain -- "${committed[@]}")" ] || { echo "release.sh: commit your changes first" >&2; exit 1; }
 version=$(sed -n 's/^project(modar VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt)
-# Clocks of devices count from the day of the release on (kNotBefore): no earlier than the changelog's last change, and not later
-# than today, or expired releases would be believed and fresh ones not.
-floor=$(sed -n "s/.*kNotBefore = \([0-9']*\);.*/\1/p" runtime/fetch/fetch.cpp | tr -d "'")
-changed=$(git log -1 --format=%ct -- CHANGELOG.md)
-if [ "${floor:-0}" -lt $((changed / 86400 * 86400)) ] || [ "$floor" -gt "$(date +%s)" ]; then
-  echo "release.sh: raise kNotBefore in runtime/fetch/fetch.cpp to the day of this release:" \
-    "$(($(date +%s) / 86400 * 86400)), $(date -u +%F)" >&2
-  exit 1
-fi
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH
-mkdir -p build
-log=$root/build/release.log
-: >"$log"
-step() {  # WHAT COMMAND...: one line with its seconds; what it prints goes to the log
-  local what=$1 start=$SECONDS status=0
-  shift
-  printf '%-66s ' "$what"
-  "$@" >>"$log" 2>&1 || status=$?
-  if [ $status -ne 0 ]; then
-    printf 'failed\n'
-    tail -n 25 "$log" >&2
-    echo "release.sh: the whole log is $log" >&2
-    exit $status
-  fi
-  printf '%4d s\n' $((SECONDS - start))
-}
+log=build/release.log
+steps=
+# shellcheck source=scripts/steps.sh
+. scripts/steps.sh
 packed() { tar --sort=name --owner=0 --group=0 --numeric-owner --mode=go=u-w "--mtime=@$SOURCE_DATE_EPOCH" -c "$@" | gzip -9n; }
 npm_files() {  # FOLDER: what its package.json lists
   python3 -c 'import json, sys; print("package.json", *json.load(open(sys.argv[1]))["files"], sep="\n")' "$1/package.json"
 }
 
-build() {  # FOLDER OUT: engine and packages of the clone in FOLDER
-  local clone=$1 to=$2
-  (cd "$clone" && scripts/sources.sh --libraries)
+build() {  # FOLDER OUT: engine and packages of the checkout in FOLDER, whatever options its builds had
+  local tree=$1 to=$2
+  (cd "$tree" && scripts/sources.sh --libraries)
   for preset in web package; do
-    (cd "$clone" && cmake --preset $preset && cmake --build --preset $preset) || return
+    (cd "$tree" && cmake --fresh --preset $preset && cmake --build --preset $preset)
   done
   mkdir -p "$to"
-  cp "$clone"/build/package/packages/*.deb "$to"
-  packed -C "$clone/build/web" web >"$to/modar-web-$version.tar.gz"
+  cp "$tree"/build/release/packages/*.deb "$to"
+  packed -C "$tree/build/web" web >"$to/modar-web-$version.tar.gz"
   # As `npm pack` lays it out, whose bytes differ from version to version.
-  npm_files "$clone/build/web/web" >"$work/npm-files"
-  packed -C "$clone/build/web/web" --transform 's,^,package/,' -T "$work/npm-files" >"$to/modar-$version.tgz"
+  npm_files "$tree/build/web/web" >"$work/npm-files"
+  packed -C "$tree/build/web/web" --transform 's,^,package/,' -T "$work/npm-files" >"$to/modar-$version.tgz"
 }
 look() {  # Lintian's errors and warnings stop a release.
   lintian --fail-on error,warning --allow-root "$out"/*.deb
 }
-clone() {  # FOLDER: what is committed, with the library sources that are there already
-  rm -rf "$1"
+clone() {  # FOLDER: committed files, with the library sources
   git clone --quiet --no-local "$root" "$1"
-  [ ! -d build/sources ] || { mkdir -p "$1/build"; cp -a build/sources "$1/build/"; }
+  mkdir "$1/build"
+  cp -a build/sources "$1/build/"
 }
 apt_sources() {  # This machine's own of Debian 12, where it has some.
   grep -ls bookworm /etc/apt/sources.list.d/debian.sources /etc/apt/sources.list | head -n 1
@@ -111,11 +92,12 @@ trap 'rm -rf "$work"' EXIT
 rm -rf "$out"
 mkdir -p "$out"
 echo "ModAR $version, $(git log -1 --format='%h of %cs'). The output of the programs goes to build/release.log."
-step "Debian packages that building takes (2 GB, the first time)" scripts/setup.sh web release
-step "engine and packages" eval 'clone "$work/one" && build "$work/one" "$out"'
+step "Debian packages that building takes (3.3 GB, the first time)" scripts/setup.sh web release
+rm -rf build/release/packages
+step "engine and packages" build "$root" "$out"
 step "lintian" look
 if [ $twice = yes ]; then
-  step "engine and packages once more, in another folder" eval 'clone "$work/another/two" && build "$work/another/two" "$work/again"'
+  step "engine and packages once more, in another folder" eval 'clone "$work/two"; build "$work/two" "$work/again"'
   step "the same bytes" diff -r "$out" "$work/again"
 fi
 if [ "$(id -u)" -eq 0 ]; then
@@ -123,10 +105,10 @@ if [ "$(id -u)" -eq 0 ]; then
 else
   echo "No container: making one takes root."
 fi
-step "sources" eval 'git archive --format=tar --prefix="modar-$version/" HEAD | gzip -9n >"$out/modar-$version.tar.gz"'
+step "sources" eval 'set -o pipefail; git archive --format=tar --prefix="modar-$version/" HEAD | gzip -9n >"$out/modar-$version.tar.gz"'
 if [ -n "${ANDROID_NDK:-}" ]; then
   step "packages for the app" scripts/setup.sh android
-  step "a bundle for the app" "$work/one/build/package/bin/modar" bake --model assets/models/pottery.obj \
+  step "a bundle for the app" build/release/bin/modar bake --model assets/models/pottery.obj \
     --pattern assets/patterns/cover.png:210mm --scene cover=pottery,scale=0.5 -o "$work/demo.modar"
   step "app" app
 else

@@ -1,21 +1,22 @@
 #!/usr/bin/env bash
 # Installs Debian packages that are named in scripts/packages*.txt and not yet there.
-#   scripts/setup.sh [test] [demo] [web] [browser] [android] [release]
-# Packages of the build always; those of the tests, the demo, the page's engine (web), browsers, the Android app and a release where
-# named. Uses sudo if not root.
+#   scripts/setup.sh [core] [test] [demo] [web] [browser] [android] [release] [quick]
+# Packages of the build always, without those of extensions if `core` is given; those of the tests, the demo, the page's engine (web), browsers, the Android app, a release and
+# test.sh --quick where named. Uses sudo if not root.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 
 lists=("$here/packages.txt")
+[ "${1:-}" = core ] && shift || lists+=("$here/packages-extensions.txt")
 for extra in "$@"; do
   case $extra in
-    test | demo | web | browser | android | release) lists+=("$here/packages-$extra.txt") ;;
-    *) echo "setup.sh: '$extra' is not one of test, demo, web, browser, android and release" >&2; exit 1 ;;
+    test | demo | web | browser | android | release | quick) lists+=("$here/packages-$extra.txt") ;;
+    *) echo "setup.sh: '$extra' is not one of core (first), test, demo, web, browser, android, release and quick" >&2; exit 1 ;;
   esac
 done
 
 wanted=$(sed -E 's/#.*//; s/^[[:space:]]*([^[:space:]]+).*/\1/' "${lists[@]}" | grep -v '^[[:space:]]*$' | sort -u)
-# What is there, by its own name or as what another package provides.
+# Installed packages, by name or as provided by another package.
 there=$(dpkg-query -W -f '${db:Status-Abbrev}${Package}, ${Provides}\n' 2>/dev/null |
   sed -n -E 's/^ii //; T; s/ \([^)]*\)//g; s/, */\n/g; p' | sort -u || true)
 mapfile -t missing < <(comm -23 <(echo "$wanted") <(echo "$there"))

@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
-"""Holds the built programs and libraries of the device against their committed ceilings, and tells
-which symbols grew since those were written.
+"""Compares the built programs and libraries of the device with their committed ceilings.
 
   scripts/size.py [--build build/device] [--ceilings scripts/size_ceilings.json] [--most 20] [--json]
-  scripts/size.py --update      writes the sizes of today; ceilings stay as they are
+  scripts/size.py --update      records the sizes of today in the build folder (sizes.json)
 
-A program weighs what `strip` leaves of it (libc, EGL and GLES are the phone's own), a library the
-code and data that its objects hold before a linker leaves anything out. A target with a `triple` is
-another processor's, in a build folder beside, and left out with a word where that is not built or
-binutils for it are missing (scripts/foreign.sh armhf builds it). Data goes to stdout. Exits 2 where
-something is not built, 3 where something is above its ceiling.
+Names the symbols that grew since the last --update; without one, the largest symbols. A program is
+measured after `strip` (libc, EGL and GLES belong to the phone), a library by the code and data that
+its objects hold before linking. A target with a `triple` is another processor's, in a sibling build
+folder; it is left out with a note where that is not built or binutils for it are missing
+(scripts/foreign.sh armhf builds it). Data goes to stdout. Exits 2 where something is not built, 3
+where something is above its ceiling.
 """
 import argparse
 import json
@@ -20,7 +20,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-LEAST = 512  # bytes: smaller symbols are not kept one by one
+LEAST = 512  # bytes: smaller symbols are not recorded
 
 
 def output_of(*command):
@@ -48,7 +48,7 @@ def symbols(path, tools):
 
 
 def grown(before, now, most):
-    """[(bytes more, symbol)], the most first; what is new grew from nothing."""
+    """[(bytes more, symbol)], largest growth first; a new symbol grew from 0."""
     more = [(size - before.get(name, 0), name) for name, size in now.items()]
     return sorted((row for row in more if row[0] > 0), key=lambda row: (-row[0], row[1]))[:most]
 
@@ -61,9 +61,11 @@ def main():
     parser.add_argument("--update", action="store_true")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    targets = json.loads(options.ceilings.read_text())
+    recorded = options.build / "sizes.json"
+    before = json.loads(recorded.read_text()) if recorded.exists() else {}
+    sizes = {}
     rows = []
-    for name, target in targets.items():
+    for name, target in json.loads(options.ceilings.read_text()).items():
         tools = target["triple"] + "-" if "triple" in target else ""
         path = (options.build.parent if tools else options.build) / name
         if tools and not (path.exists() and shutil.which(tools + "strip")):
@@ -72,22 +74,23 @@ def main():
         if not path.exists():
             print(f"size.py: {path} is not built; cmake --build --preset device builds it", file=sys.stderr)
             return 2
-        now = symbols(path, tools)
-        rows.append({"target": name, "bytes": weight(path, tools), "ceiling": target["ceiling"], "was": target["bytes"],
-                     "grown": grown(target["symbols"], now, options.most)})
-        target.update(bytes=rows[-1]["bytes"], symbols=now)
+        then = before.get(name, {"bytes": None, "symbols": {}})
+        sizes[name] = {"bytes": weight(path, tools), "symbols": symbols(path, tools)}
+        rows.append({"target": name, "bytes": sizes[name]["bytes"], "ceiling": target["ceiling"], "before": then["bytes"],
+                     "grown": grown(then["symbols"], sizes[name]["symbols"], options.most)})
     if options.update:
-        options.ceilings.write_text(json.dumps(targets, indent=1) + "\n")
-        return 0
-    if options.json:
+        recorded.write_text(json.dumps(sizes, indent=1) + "\n")
+    elif options.json:
         print(json.dumps(rows, indent=1))
     else:
         for row in rows:
-            print(f"{row['target']}: {row['bytes']} of {row['ceiling']} bytes, {row['bytes'] - row['was']:+d}")
-            if row["bytes"] > row["was"]:
+            above = row["bytes"] > row["ceiling"]
+            change = "" if row["before"] is None else f", {row['bytes'] - row['before']:+d}"
+            print(f"{row['target']}: {row['bytes']} of {row['ceiling']} bytes{change}")
+            if above or row["bytes"] > (row["before"] or row["bytes"]):
                 for more, symbol in row["grown"]:
                     print(f"  {more:+7d}  {symbol[:140]}")
-    return 3 if any(row["bytes"] > row["ceiling"] for row in rows) else 0
+    return 3 if any(row["bytes"] > row["ceiling"] for row in rows) and not options.update else 0
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Sources out of Debian's source packages, for what Debian has no binary packages of.
-#   scripts/sources.sh FOLDER PACKAGE...   fetches their archives into FOLDER; what is there stays
-#   scripts/sources.sh --libraries         what modar::fetch needs for WebAssembly and Android (libsodium, zstd,
+#   scripts/sources.sh FOLDER PACKAGE...   fetches their archives into FOLDER; existing ones stay
+#   scripts/sources.sh --libraries         libraries of modar::fetch for WebAssembly and Android (libsodium, zstd,
 #                                          meshoptimizer, Draco), unpacked in build/sources (40 MB to fetch, once)
 # Exit code 2 where there is no network.
 set -euo pipefail

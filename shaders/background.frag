@@ -21,7 +21,7 @@ uniform vec3 u_range;
 
 vec3 from_yuv(float luma, vec2 chroma) {
   float y = luma * u_range.x + u_range.y;
-  // ITU-R BT.601; 128 stands for no chroma.
+  // ITU-R BT.601; 128 means no chroma.
   vec2 uv = (chroma - 0.50196078) * u_range.z;
   return vec3(y + 1.402 * uv.y, y - 0.344136 * uv.x - 0.714136 * uv.y, y + 1.772 * uv.x);
 }

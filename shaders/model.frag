@@ -1,4 +1,4 @@
-// Lit surface: base colour (texture, vertex colour, or white) times light, plus what is added; both
+// Lit surface: base colour (texture, vertex colour, or white) times light, plus the added light; both
 // come from model.vert as factors and summands of sRGB.
 // Defines: TEXTURED; ALPHA_TWIN (alpha is the luminance of a second texture), and with it
 // CUT_OUT (there or not); COLOURED; SHINY.

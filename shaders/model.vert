@@ -1,12 +1,12 @@
 // Any vertex layout of a bundle, one variant a layout. One item has one matrix to clip space, and its
-// light comes in its model's space, so that normals are taken as they are. Where a call draws several
+// light comes in its model's space, so that normals are taken unchanged. Where a call draws several
 // items, a slot is three rows of the affine matrix from attribute space to eye space, and the scale
 // and offset of uv; light comes in eye space.
 // Defines: NORMAL_XYZ or NORMAL_OCT; TEXTURED; COLOURED; SHINY (adds a highlight, what it mirrors, emission);
 // SLOT_STREAM with SLOT_COUNT (a vertex chooses its slot), or SLOT_ATTRIBUTES (rows step once an
 // instance), or neither: one item, whose matrix keeps angles.
 //
-// Light is summed here in linear light. A fragment multiplies colours as they are stored (sRGB):
+// Light is summed here in linear light. A fragment multiplies stored colours (sRGB):
 // that equals a product in linear light where the transfer function is a power, so the sum is
 // handed over encoded, and the fragment's work is that of one product.
 attribute vec3 a_position;
@@ -53,8 +53,7 @@ varying vec3 v_light;
 uniform vec4 u_specular;
 // w: metalness.
 uniform vec4 u_emission;
-// Of what is mirrored: factors on the linear and quadratic parts of the sky, the share straight on
-// and what is added to it at a grazing angle.
+// Of the reflection: factors on the linear and quadratic parts of the sky, the share straight on and the increase at a grazing angle.
 uniform vec4 u_mirror;
 // The mean colour that light is multiplied with, linear: a highlight is added to it.
 uniform vec4 u_albedo;
@@ -141,7 +140,7 @@ void main() {
 #endif
   vec3 light = sky + u_key_colour.rgb * max(dot(n, u_key.xyz), 0.0);
 #else
-  // Nothing tells which way the surface looks: its colours are what is seen.
+  // Nothing tells which way the surface looks: its colours are shown.
   vec3 light = vec3(u_key_colour.w);
 #endif
 #ifdef SHINY

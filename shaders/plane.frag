@@ -1,4 +1,4 @@
-// A picture that stands on a pattern: its texels as they are, in no light. Defines: ALPHA_TWIN (alpha
+// A picture on a pattern: its texels unchanged, without light. Defines: ALPHA_TWIN (alpha
 // is the luminance of a second texture); of videos BESIDE (the right half is the left half's alpha) or
 // KEY (a colour is not seen).
 precision mediump float;

@@ -1,4 +1,4 @@
-// Darkens what is behind it to the share of light that is left: linear in the texture, and the
+// Darkens the picture behind it to the remaining share of light: linear in the texture, and the
 // picture behind is sRGB, where the root of a factor multiplies.
 precision mediump float;
 varying vec2 v_uv;

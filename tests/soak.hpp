@@ -6,8 +6,8 @@
 
 namespace modar::testing {
 
-/// True under `scripts/test.sh --soak`, which sets MODAR_SOAK=full; `--all` sets it to 1, the plain
-/// run to 0.
+/// True under `scripts/test.sh --soak`, which sets MODAR_SOAK=full; without options
+/// it is 1, with `--quick` 0.
 inline bool soak() {
   const char* named = std::getenv("MODAR_SOAK");
   return named != nullptr && std::string_view(named) == "full";

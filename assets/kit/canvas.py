@@ -123,7 +123,7 @@ class Canvas:
                     yield row, max(a, c), min(b, d)
 
     def polygon(self, points, colour, alpha=1.0):
-        """Fills a polygon; below an alpha of 1 it is laid over what is there."""
+        """Fills a polygon; below an alpha of 1 it is blended over the present colour."""
         shade = colour if callable(colour) else None
         tables = None
         for row, a, b in self._clipped(points):

@@ -91,7 +91,7 @@ def ray(axis, t, turn):
 
 
 def spread(solid, axis, count, reach, turns, weight=None):
-    """`count` values of t whose hits lie equally far apart, as seen along `turns`.
+    """`count` values of t whose hits are equally far apart, as seen along `turns`.
 
     weight(t) asks for more rings where it is large.
     """

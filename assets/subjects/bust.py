@@ -6,9 +6,9 @@ from kit.canvas import mix
 from kit.png import Picture
 from kit.solids import blend, capsule, carve, ellipsoid, sphere, step
 
-# Metres, Z up, the face towards -Y. The head's middle stands at z = 0.47.
+# Metres, Z up, the face towards -Y. The head's middle is at z = 0.47.
 SEGMENTS, RINGS, REACH, TEXTURE, COARSE = 85, 47, 0.45, 512, 256
-FRONT = 0.58  # how much closer together the points of a ring stand in front
+FRONT = 0.58  # how much closer together the points of a ring are in front
 AXIS = solids.Axis([(0.47, 90), (0.47, 55), (0.47, 20), (0.46, 4), (0.44, -6), (0.405, -8), (0.37, -5),
                     (0.342, 0), (0.315, 8), (0.285, 14), (0.257, 9), (0.235, -2), (0.215, -16), (0.195, -30),
                     (0.17, -26), (0.135, -6), (0.1, 0), (0.07, 0), (0.045, 0), (0.02, 0), (0.0, 0)])

@@ -154,7 +154,7 @@ def pattern(p, turn):
 
 
 def paint(p):
-    """The colour at p: what is left of old paint on stone, darker in the hollows."""
+    """The colour at p: remains of old paint on stone, darker in the hollows."""
     distances = parts(p)
     part = min(range(len(distances)), key=lambda i: (round(distances[i], 7), i))
     turn = math.atan2(p[1], p[0])

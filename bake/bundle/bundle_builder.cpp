@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 
 #include <glm/geometric.hpp>
 
@@ -22,6 +23,7 @@
 #include "bake/mesh/topology/mesh_topology.hpp"
 #include "bake/mesh/upright.hpp"
 #include "bake/mesh/weld/weld.hpp"
+#include "bake/options/options.hpp"
 #include "bake/pattern/alike_patterns.hpp"
 #include "bake/pattern/pattern.hpp"
 #include "bake/texture/relief/relief.hpp"
@@ -29,6 +31,7 @@
 #include "formats/base/path.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/content_summary.hpp"
+#include "formats/field_table.hpp"
 #include "formats/pattern_shape.hpp"
 #include "modar/features.hpp"
 
@@ -68,7 +71,7 @@ void fold_constant(const std::array<std::uint8_t, 4>& rgba, MaterialRecord& mate
   material.opacity *= static_cast<float>(rgba[3]) / 255.0f;
 }
 
-/// The first model's bytes are taken over as they are: large ones are not copied.
+/// The first model's bytes are taken over unchanged: large ones are not copied.
 void append_bytes(std::vector<std::byte> bytes, std::vector<std::byte>& to) {
   if (to.empty()) {
     to = std::move(bytes);
@@ -122,13 +125,13 @@ void merge_model(PackedMesh packed, const std::vector<TextureOutcome>& textures,
   content.models.push_back(record);
 }
 
-/// Appends a stand-in of the last model.
-void merge_stand_in(PackedMesh packed, BundleContent& content) {
-  content.stand_ins.push_back({static_cast<std::uint32_t>(content.models.size() - 1),
-                               static_cast<std::uint32_t>(content.stand_in_chunks.size()),
-                               static_cast<std::uint32_t>(packed.chunks.size()), 0});
-  append_geometry(std::move(packed), content.models.back().first_material, content.stand_in_chunks,
-                  content.stand_in_levels, content);
+/// Appends a proxy of the last model.
+void merge_proxy(PackedMesh packed, BundleContent& content) {
+  content.proxies.push_back({static_cast<std::uint32_t>(content.models.size() - 1),
+                             static_cast<std::uint32_t>(content.proxy_chunks.size()),
+                             static_cast<std::uint32_t>(packed.chunks.size()), 0});
+  append_geometry(std::move(packed), content.models.back().first_material, content.proxy_chunks,
+                  content.proxy_levels, content);
 }
 
 /// The order of the last model's triangles that are seen through.
@@ -165,7 +168,7 @@ struct WeldedModel {
   std::vector<std::uint32_t> uses;  ///< of textures, one a material
 };
 
-/// Notes the files that a model refers to. Images from inside a file lie in temporary files.
+/// Notes the files that a model refers to. Images from inside a file are in temporary files.
 void note_files(const SourceModel& source, std::vector<std::string>& files) {
   files.insert(files.end(), source.files.begin(), source.files.end());
   for (const SourceMaterial& material : source.materials) {
@@ -189,14 +192,15 @@ bool own_picture(const ModelRequest& model, const BakeRequest& request) {
 Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& request,
                                   TextureUses& textures, Report& report, BakeTrace& trace) {
   StageTimer reading(report, "read");
-  Result<SourceModel> source = read_model(model.path, {request.jobs, own_picture(model, request)});
+  Result<SourceModel> source =
+      read_model(model.path, {request.jobs, own_picture(model, request), request.within});
   if (!source) return tl::unexpected(source.error());
   source->name = model.name;
   report.diagnostics.insert(report.diagnostics.end(), source->diagnostics.begin(),
                             source->diagnostics.end());
   note_files(*source, trace.files);
   reading.done(source->positions.size(), source->face_count());
-  Result<TriMesh> mesh = weld(std::move(*source), report, {request.jobs});
+  Result<TriMesh> mesh = weld(std::move(*source), report, {request.jobs, request.crease_degrees()});
   if (!mesh) {
     mesh.error().where = model.path;  // it has the model's name only
     return tl::unexpected(mesh.error());
@@ -220,7 +224,7 @@ Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& 
   return welded;
 }
 
-/// The greatest error that is asked for, in a model's source units; 0: any.
+/// The greatest requested error, in a model's source units; 0: any.
 Result<double> max_error_of(const BakeRequest& request, const TriMesh& mesh) {
   switch (request.max_error.unit) {
     case MaxError::Unit::kAny:
@@ -240,36 +244,30 @@ Result<double> max_error_of(const BakeRequest& request, const TriMesh& mesh) {
   return request.max_error.value / request.unit_metres;
 }
 
-/// Of the mean edge: beyond it, half floats bend what triangles show. Between a scan of 0.1 million
-/// triangles, which has 2 %, and one of 0.9 million, which has 7 %.
-constexpr double kVisibleError = 0.05;
-
-/// Says how positions are stored where the user did not: floats, or half floats that 16-bit
-/// integers would be better than.
-void tell_positions(const ChunkedMesh& mesh, const PackedMesh& packed, const PositionPlan& plan,
-                    const BakeRequest& request, Report& report) {
+/// Says how positions are stored, and by which rule, where the user did not.
+void tell_positions(const PackedMesh& packed, const PositionPlan& plan, const BakeRequest& request,
+                    Report& report) {
   char text[256];
   std::string cure;
+  const double share = plan.mean_edge > 0 ? 100 * plan.half_error / plan.mean_edge : 0;
   if (plan.kind == PositionKind::kFloat) {
     std::snprintf(text, sizeof text,
                   "positions are stored as floats, %u bytes a vertex: no grid of 16-bit integers "
-                  "is as fine as was asked and spans the longest triangle",
+                  "is as fine as requested and spans the longest triangle",
                   packed.layout.stride);
     cure = "a larger --max-error needs fewer bytes";
+  } else if (request.positions || plan.half_error == 0) {
+    return;
+  } else if (plan.kind == PositionKind::kHalf) {
+    std::snprintf(text, sizeof text,
+                  "positions are stored as half floats: they lose no triangle and move vertices by "
+                  "at most %.1f %% of the mean edge",
+                  share);
   } else {
-    const double edge = plan.mean_edge * mesh.mesh.placement.scale;
-    const double error = packed.record.position_error_max;
-    const bool chosen = plan.kind == PositionKind::kHalf && !request.positions;
-    if (!chosen || error <= kVisibleError * edge) return;
-    const double step = make_grids(mesh, PositionKind::kInt16).front().step;
-    std::snprintf(
-        text, sizeof text,
-        "half floats (%u bytes a vertex) move vertices by up to %.3g, %.0f %% of the mean "
-        "edge; 16-bit integers (%u bytes) would move them by at most %.3g",
-        packed.layout.stride, error, 100 * error / edge,
-        packed.layout.stride - (packed.occlusion_byte == kNone ? 4u : 0u),
-        step * std::sqrt(0.75) * mesh.mesh.placement.scale);
-    cure = "bake with --positions int16";
+    std::snprintf(text, sizeof text,
+                  "positions are stored as 16-bit integers: half floats would lose %zu triangles "
+                  "and move vertices by up to %.1f %% of the mean edge",
+                  plan.half_loss, share);
   }
   report.diagnostics.push_back(
       {"model.positions", DiagnosticSeverity::kInfo, packed.name, 0, text, cure});
@@ -281,16 +279,16 @@ constexpr std::size_t kDrawnWhole = 1'000'000;
 /// A model in its bytes.
 struct ShapedModel {
   PackedMesh model;
-  std::vector<PackedMesh> stand_ins;
+  std::vector<PackedMesh> proxies;
 };
 
-/// Packs stand-ins, each with the error of the whole.
-Result<std::vector<PackedMesh>> pack_stand_ins(const ChunkedMesh& mesh,
-                                               const std::vector<StandInStart>& starts,
-                                               const StandInOptions& options,
-                                               const std::vector<std::uint32_t>& texture_sides,
-                                               const PackOptions& pack_options, Report& report) {
-  MODAR_ASSIGN(const std::vector<StandIn> made, make_stand_ins(mesh, starts, options, report));
+/// Packs proxies, each with the error of the whole.
+Result<std::vector<PackedMesh>> pack_proxies(const ChunkedMesh& mesh,
+                                             const std::vector<ProxyStart>& starts,
+                                             const ProxyOptions& options,
+                                             const std::vector<std::uint32_t>& texture_sides,
+                                             const PackOptions& pack_options, Report& report) {
+  MODAR_ASSIGN(const std::vector<Proxy> made, make_proxies(mesh, starts, options, report));
   if (!made.empty()) {
     double& greatest = report.levels.back().position_error_max;
     greatest = std::max(greatest, made.back().error * mesh.mesh.placement.scale);
@@ -298,17 +296,20 @@ Result<std::vector<PackedMesh>> pack_stand_ins(const ChunkedMesh& mesh,
   std::vector<PackedMesh> all;
   Report quiet;
   double shown = 0;  // never falls, and is never below the truth
-  for (const StandIn& stand_in : made) {
-    MODAR_ASSIGN(PackedMesh packed, pack(stand_in.mesh, texture_sides, pack_options, quiet));
-    shown = std::max({shown, stand_in.error, stand_in.shading});
+  for (const Proxy& proxy : made) {
+    Result<PackedMesh> packed = pack(proxy.mesh, texture_sides, pack_options, quiet);
+    // Coarser ones have no area as stored either.
+    if (!packed && packed.error().code == "model.no-area") break;
+    if (!packed) return tl::unexpected(packed.error());
+    shown = std::max({shown, proxy.error, proxy.shading});
     const float error = std::nextafter(static_cast<float>(shown), 4.0f);
-    for (LevelRecord& level : packed.levels) level.error = error;
-    all.push_back(std::move(packed));
+    for (LevelRecord& level : packed->levels) level.error = error;
+    all.push_back(std::move(*packed));
   }
   return all;
 }
 
-/// Splits and packs a model as finely as was asked.
+/// Splits and packs a model as finely as requested.
 Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& texture_sides,
                                 const BakeRequest& request, Report& report) {
   const Result<double> max_error = max_error_of(request, mesh);
@@ -328,25 +329,24 @@ Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& 
   level_options.positions = plan->kind;
   level_options.jobs = request.jobs;
   level_options.texture_sides = texture_sides;
-  const StandInPlan stand_ins = plan_stand_ins(*chunked, level_options);
-  if (!stand_ins.halvings.empty()) level_options.most_halvings = stand_ins.halvings[0] - 1;
-  level_options.start = stand_ins.start;
-  MODAR_ASSIGN(const std::vector<StandInStart> starts,
-               make_levels(*chunked, level_options, report));
+  const ProxyPlan proxies = plan_proxies(*chunked, level_options);
+  if (!proxies.halvings.empty()) level_options.most_halvings = proxies.halvings[0] - 1;
+  level_options.start = proxies.start;
+  MODAR_ASSIGN(const std::vector<ProxyStart> starts, make_levels(*chunked, level_options, report));
   PackOptions pack_options;
   pack_options.unit_metres = request.unit_metres;
   pack_options.positions = plan->kind;
   pack_options.jobs = request.jobs;
   ShapedModel shaped;
-  MODAR_ASSIGN(shaped.stand_ins, pack_stand_ins(*chunked, starts, {stand_ins, plan->kind},
-                                                texture_sides, pack_options, report));
-  const bool one_chunk = chunked->chunks.size() == 1 && !shaped.stand_ins.empty();
-  drop_alike_levels(*chunked, one_chunk ? shaped.stand_ins[0].levels[0].error
+  MODAR_ASSIGN(shaped.proxies, pack_proxies(*chunked, starts, {proxies, plan->kind}, texture_sides,
+                                            pack_options, report));
+  const bool one_chunk = chunked->chunks.size() == 1 && !shaped.proxies.empty();
+  drop_alike_levels(*chunked, one_chunk ? shaped.proxies[0].levels[0].error
                                         : std::numeric_limits<double>::infinity());
   // Smaller models are drawn whole, and chunks that share a range are drawn in one call.
   pack_options.prefixes = triangles_in(*chunked) > kDrawnWhole;
   MODAR_ASSIGN(shaped.model, pack(*chunked, texture_sides, pack_options, report));
-  tell_positions(*chunked, shaped.model, *plan, request, report);
+  tell_positions(shaped.model, *plan, request, report);
   return shaped;
 }
 
@@ -371,18 +371,22 @@ Result<void> add_model(WeldedModel welded, const std::vector<TextureOutcome>& ou
   cut_crossing(welded.mesh, seen_through);
   MODAR_ASSIGN(ShapedModel shaped, shape_model(std::move(welded.mesh), sides, request, report));
   merge_model(std::move(shaped.model), textures, content);
-  for (PackedMesh& packed : shaped.stand_ins) merge_stand_in(std::move(packed), content);
+  for (PackedMesh& packed : shaped.proxies) merge_proxy(std::move(packed), content);
   add_draw_orders(content);
   return {};
 }
 
-Result<void> add_models(const BakeRequest& request, BundleContent& content, Report& report,
-                        BakeTrace& trace) {
+Result<void> add_models(const BakeRequest& request, const std::vector<KnownScene>& scenes,
+                        BundleContent& content, Report& report, BakeTrace& trace) {
   TextureUses textures;
   std::vector<WeldedModel> models;
   for (const ModelRequest& model : request.models) {
     Result<WeldedModel> welded = read_and_weld(model, request, textures, report, trace);
     if (!welded) return tl::unexpected(welded.error());
+    for (const KnownScene& known : scenes) {
+      if (known.model != models.size()) continue;
+      MODAR_TRY(check_extent(known.scene, welded->mesh, report.uprights.back().axis));
+    }
     const glm::dvec3 box = welded->mesh.source_max - welded->mesh.source_min;
     trace.model_sides.push_back({box.x, box.y, box.z});
     models.push_back(std::move(*welded));
@@ -409,14 +413,41 @@ Result<void> add_models(const BakeRequest& request, BundleContent& content, Repo
 
 /// Those that the request asks for.
 void add_parameter_sets(const BakeRequest& request, BundleContent& content) {
-  const std::vector<std::string>& asked = request.parameters;
-  for (const ParameterSetRecord& set : paper_parameter_sets()) {
-    const char* name = parameter_set_name(set.id);
-    if (!asked.empty() && std::find(asked.begin(), asked.end(), name) == asked.end()) continue;
-    ParameterSetRecord named = set;
-    named.name = content.intern(name);
-    content.parameter_sets.push_back(named);
+  for (const std::string& name : stored_parameters(request)) {
+    ParameterSetRecord set = *std::ranges::find_if(paper_parameter_sets(), [&](const auto& each) {
+      return name == parameter_set_name(each.id);
+    });
+    set.name = content.intern(name);
+    content.parameter_sets.push_back(set);
   }
+}
+
+/// A section of the pattern that is added next.
+void add_pattern_section(BundleContent& content, SectionType type, std::vector<std::byte> bytes) {
+  ExtraSection section;
+  section.type = static_cast<std::uint32_t>(type);
+  section.owner = static_cast<std::uint32_t>(content.patterns.size());
+  section.bytes = std::move(bytes);
+  content.extra.push_back(std::move(section));
+}
+
+/// What people see of a pattern, of a box its front; and the colours by which light is estimated.
+Result<void> add_colours(const PatternRequest& request, const PatternFeatures& baked,
+                         BundleContent& content) {
+  const bool target = is_target_file(request.path);
+  MODAR_ASSIGN(const RgbaImage picture,
+               target ? read_target_colours(request.path)
+                      : read_pattern_picture(request.path, request.width_mm, request.shape));
+  const bool front = request.shape.kind == ShapeRequest::Kind::kBox;
+  MODAR_ASSIGN(auto preview, encode_preview(picture, front ? picture.width : baked.record.width,
+                                            front ? picture.height : baked.record.height));
+  add_pattern_section(content, SectionType::kPatternPicture, std::move(preview));
+  // A target file names a part of a picture, and on a curved surface light changes from cell to
+  // cell: their light is not estimated.
+  if (!target && baked.shape.empty()) {
+    add_pattern_section(content, SectionType::kPatternColours, pattern_colours(picture));
+  }
+  return {};
 }
 
 Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptions& loop,
@@ -433,34 +464,52 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
   PatternRecord record = baked->record;
   record.name = content.intern(request.name);
   trace.ranges.push_back(baked->range);
-  ExtraSection section;
-  section.type = static_cast<std::uint32_t>(SectionType::kTrackerRecord);
-  section.owner = static_cast<std::uint32_t>(content.patterns.size());
-  section.bytes = std::move(baked->loop_record);
-  content.extra.push_back(std::move(section));
+  add_pattern_section(content, SectionType::kTrackerRecord, std::move(baked->loop_record));
+  MODAR_TRY(add_colours(request, *baked, content));
   if (!baked->shape.empty()) {
-    ExtraSection shape;
-    shape.type = static_cast<std::uint32_t>(SectionType::kPatternShape);
-    shape.owner = static_cast<std::uint32_t>(content.patterns.size());
-    shape.bytes = std::move(baked->shape);
-    content.extra.push_back(std::move(shape));
-  } else if (!is_target_file(request.path)) {
-    // A target file names a part of a picture, and on what is curved light changes from cell to
-    // cell: their light is not estimated.
-    ExtraSection colours;
-    colours.type = static_cast<std::uint32_t>(SectionType::kPatternColours);
-    colours.owner = static_cast<std::uint32_t>(content.patterns.size());
-    MODAR_ASSIGN(const RgbaImage picture,
-                 read_pattern_picture(request.path, request.width_mm, request.shape));
-    colours.bytes = pattern_colours(picture);
-    content.extra.push_back(std::move(colours));
+    add_pattern_section(content, SectionType::kPatternShape, std::move(baked->shape));
   }
   content.patterns.push_back(record);
   content.features.push_back(std::move(baked->features));
   return {};
 }
 
+template <class Number>
+void clear_tiny(std::byte* at) {
+  Number number = 0;
+  std::memcpy(&number, at, sizeof number);
+  if (std::fpclassify(number) == FP_SUBNORMAL) std::memset(at, 0, sizeof number);
+}
+
+template <class Record>
+void clear_tiny(const char* name, std::vector<Record>& records) {
+  for (const FieldInfo& field : record_info(name).fields) {
+    for (Record& record : records) {
+      std::byte* at = reinterpret_cast<std::byte*>(&record) + field.offset;
+      for (std::size_t i = 0; i < field.count; ++i, at += field_element_bytes(field.type)) {
+        if (field.type == FieldType::kF32) clear_tiny<float>(at);
+        if (field.type == FieldType::kF64) clear_tiny<double>(at);
+      }
+    }
+  }
+}
+
 }  // namespace
+
+void finish_content(BundleContent& content) {
+  clear_tiny("ModelRecord", content.models);
+  clear_tiny("ChunkRecord", content.chunks);
+  clear_tiny("LevelRecord", content.levels);
+  clear_tiny("MaterialRecord", content.materials);
+  clear_tiny("SceneRecord", content.scenes);
+  clear_tiny("LightRecord", content.lights);
+  clear_tiny("NodeRecord", content.nodes);
+  clear_tiny("ActionRecord", content.actions);
+  clear_tiny("MediaRecord", content.media);
+  clear_tiny("ChunkRecord", content.proxy_chunks);
+  clear_tiny("LevelRecord", content.proxy_levels);
+  content.summary = content_summary_of(content);
+}
 
 bool blended(const MaterialRecord& material, const BundleContent& content) {
   if ((material.flags & kMaterialOccluder) != 0) return false;
@@ -482,7 +531,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, B
   BundleContent content;
   BakeTrace traced;
   const std::size_t first_up = report.uprights.size();
-  MODAR_TRY(add_models(named, content, report, traced));
+  MODAR_TRY(add_models(named, scenes, content, report, traced));
   if (!named.patterns.empty()) add_parameter_sets(named, content);
   TrackerRecordOptions loop = named.loop;
   loop.jobs = named.jobs;
@@ -500,9 +549,8 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, B
   }
   MODAR_TRY(add_nodes(named, content, report));
   MODAR_TRY(light_scenes(named.scenes, named, content, report));
-  named.parameters = parameters_of(content);
   content.meta = bundle_meta(named, report, traced);
-  content.summary = content_summary_of(content);
+  finish_content(content);
   if (trace != nullptr) *trace = std::move(traced);
   return content;
 }
@@ -523,7 +571,7 @@ Result<void> light_scenes(const std::vector<SceneRequest>& scenes, const BakeReq
       return section.type == static_cast<std::uint32_t>(SectionType::kPatternShape) &&
              section.owner == content.scenes[s].pattern;
     };
-    // A shadow lies in a plane.
+    // A shadow is in a plane.
     if (std::any_of(content.extra.begin(), content.extra.end(), shaped)) continue;
     content.shadows[s] = scene_shadow(content, s, request.jobs);
   }

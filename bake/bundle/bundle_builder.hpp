@@ -13,7 +13,7 @@
 
 namespace modar {
 
-/// Refuses models that stand on no pattern, and patterns that carry no model, where there are both;
+/// Refuses models without a pattern, and patterns without a model, where there are both;
 /// scenes of unknown names are left to build_bundle(). Errors: kUsage "bake.never-shown", whose
 /// cure is what to add to the command line.
 Result<void> require_shown(const BakeRequest& request);
@@ -27,16 +27,16 @@ struct BakeTrace {
   std::vector<std::array<double, 3>> model_sides;  ///< of each model's box, source units
 };
 
-/// Reads what is cheap to read of each input, so that a wrong one costs no bake: models can be
+/// Reads the cheap parts of each input, so that a wrong one costs no bake: models can be
 /// opened and have a format that is read, pictures and lights can be decoded, scenes name what
 /// there is and give lengths only where their pattern's width is known. Names must be set.
 /// Errors: those of the readers; kUsage "bake.scene-unknown", "scene.no-width".
 Result<void> check_inputs(const BakeRequest& request);
 
-/// Holds the names of nodes against each other: each has one of its own on its pattern, what
-/// actions name is there and can do what is asked, pictures can be read. check_inputs() does it,
-/// too. Errors: kUsage "node.same-name", "node.too-many", "action.unknown", "action.command",
-/// "action.part"; those of read_image().
+/// Holds the names of nodes against each other: each has one of its own on its pattern, nodes named
+/// by actions exist and can do it, pictures can be read. check_inputs() does it, too. Errors:
+/// kUsage "node.same-name", "node.too-many", "action.unknown", "action.command", "action.part";
+/// those of read_image().
 Result<void> check_nodes(const BakeRequest& request);
 
 /// Is a material of a bundle seen through, and drawn after the others?
@@ -52,6 +52,10 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report,
 /// request names one, and its shadow. scenes: as content.scenes. Errors: those of read_light().
 Result<void> light_scenes(const std::vector<SceneRequest>& scenes, const BakeRequest& request,
                           BundleContent& content, Report& report);
+
+/// Last: floats of records that are next to zero become 0, as the checker takes them for damage,
+/// and the summary is stated.
+void finish_content(BundleContent& content);
 
 /// Gives each model and pattern that has no name one: the file's stem, or, where several files have
 /// the same (as scene.gltf), the name of its folder. Errors: kUsage "bake.same-name", where two

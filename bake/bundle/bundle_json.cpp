@@ -95,7 +95,7 @@ std::uint64_t model_bytes(const BundleView& bundle, std::uint32_t index) {
 }
 
 /// The whole model at each level, finest first: chunks that have no such level at their coarsest,
-/// then its stand-ins.
+/// then its proxies.
 Json level_list(const BundleView& bundle, std::uint32_t index) {
   const ModelRecord& model = bundle.models()[index];
   Json list = Json::array();
@@ -309,14 +309,6 @@ std::string bundle_meta(const BakeRequest& request, const Report& report, const 
   return meta.dump();
 }
 
-std::vector<std::string> parameters_of(const BundleContent& content) {
-  std::vector<std::string> names;
-  for (const ParameterSetRecord& set : content.parameter_sets) {
-    names.push_back(content.names.substr(set.name.offset, set.name.length));
-  }
-  return names.empty() ? std::vector<std::string>{"none"} : names;
-}
-
 std::optional<MeshTopology> stated_topology(const BundleView& bundle, std::uint32_t model) {
   const std::optional<Json> found = stated(bundle, model, "topology");
   if (!found) return std::nullopt;
@@ -390,6 +382,22 @@ std::string level_words(const BundleView& bundle, std::uint32_t index) {
   return words;
 }
 
+/// The axis of the model that faces the visitor, who looks from the picture's lower edge: "+Z";
+/// empty where none does.
+std::string front_axis(const SceneRecord& scene) {
+  const std::array<double, 4> q = {scene.rotation[0], scene.rotation[1], scene.rotation[2],
+                                   scene.rotation[3]};
+  const std::array<double, 3> front = {-2 * (q[0] * q[1] + q[3] * q[2]),
+                                       2 * (q[0] * q[0] + q[2] * q[2]) - 1,
+                                       -2 * (q[1] * q[2] - q[3] * q[0])};
+  for (std::size_t i = 0; i < front.size(); ++i) {
+    if (std::fabs(front[i]) > 0.99) {
+      return {front[i] > 0 ? '+' : '-', static_cast<char>('X' + static_cast<char>(i))};
+    }
+  }
+  return {};
+}
+
 std::string scene_words(const BundleView& bundle, std::uint32_t index) {
   const SceneRecord& scene = bundle.scenes()[index];
   const auto placement = stated_placement(bundle, index);
@@ -402,8 +410,11 @@ std::string scene_words(const BundleView& bundle, std::uint32_t index) {
     const bool guessed = upright && upright->axis == placement->up;
     if (guessed) words += " (" + std::string(up_reason_words(upright->reason)) + ")";
   }
+  if (const std::string front = front_axis(scene); !front.empty()) {
+    words += (words.empty() ? "" : ", ") + front + " in front";
+  }
   char text[48];
-  constexpr double kFlat = 0.05;  // mm: a sheet that lies has no height
+  constexpr double kFlat = 0.05;  // mm: a flat sheet has no height
   if (const double height = scene_height_mm(bundle, scene); height > kFlat) {
     std::snprintf(text, sizeof text, "%.4g mm high", height);
   } else {

@@ -16,11 +16,8 @@
 namespace modar {
 
 /// JSON of the kMeta section: tool, options and source file names, without folders or times.
-/// What the report says of the models and the trace of the patterns stands beside each.
+/// The report of the models and the trace of the patterns are next to each.
 std::string bundle_meta(const BakeRequest& request, const Report& report, const BakeTrace& trace);
-
-/// The parameter sets that a bundle's patterns are described with, as BakeRequest::parameters.
-std::vector<std::string> parameters_of(const BundleContent& content);
 
 /// What the bundle states of a model's topology and of its levels of detail. Nothing where it was
 /// baked without them, or by others.

@@ -17,7 +17,8 @@ namespace modar {
 namespace {
 
 constexpr double kPi = 3.141592653589793;
-/// The panorama is averaged down to so many rows first: light of second degree has no more detail.
+/// The panorama is averaged down to this many rows first: light of second degree has no more
+/// detail.
 constexpr std::uint32_t kRows = 32;
 constexpr std::uint32_t kColumns = 2 * kRows;
 /// Cosine of half the angle of what counts as the key light, and of the ring around it that tells
@@ -69,7 +70,7 @@ double luma(const glm::dvec3& rgb) {
   return luminance(rgb.r, rgb.g, rgb.b);
 }
 
-/// Takes the brightest spot out of the patches, down to what is around it; its irradiance.
+/// Takes the brightest spot out of the patches, down to its surroundings; its irradiance.
 glm::dvec3 take_key(std::vector<Patch>& patches, glm::dvec3& direction) {
   double brightest = -1;
   for (const Patch& centre : patches) {

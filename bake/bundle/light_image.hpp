@@ -9,7 +9,7 @@
 namespace modar {
 
 /// Reads a Radiance HDR or any other image as a view all around (equirectangular: its top row is
-/// the ceiling, its middle column lies behind the pattern, in its +y) and sums up what it gives:
+/// the ceiling, its middle column is behind the pattern, in its +y) and sums up what it gives:
 /// nine coefficients, and the brightest spot as the key light. What it gives a surface that looks
 /// up is scaled to what the neutral room gives, so that only its colours and directions count. A
 /// photo that shows a part of a room serves as well: ceiling above, floor below. Leaves `scene` at

@@ -7,7 +7,6 @@
 #include "bake/bundle/scene/scene_nodes.hpp"
 #include "bake/bundle/scene/scene_placement.hpp"
 #include "formats/colour_grid.hpp"
-#include "formats/content_summary.hpp"
 #include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
 
@@ -43,7 +42,9 @@ class Linker {
       add_model(part);
     }
     // A bake interns the names of parameter sets before those of patterns.
-    for (const LinkPart& part : patterns) add_parameter_sets(part.bundle);
+    for (const LinkPart& part : patterns) {
+      if (part.keypoints) add_parameter_sets(part.bundle);
+    }
     for (const LinkPart& part : patterns) {
       if (part.bundle.patterns().size() != 1) return no_part(part, "pattern");
       add_pattern(part);
@@ -62,12 +63,11 @@ class Linker {
     Report quiet;
     MODAR_TRY(add_nodes(resolved, content_, quiet, media));
     MODAR_TRY(light_scenes(resolved.scenes, resolved, content_, quiet));
-    resolved.parameters = parameters_of(content_);
     Json meta = Json::parse(bundle_meta(resolved, {}, {}));
     meta.set("models", std::move(models_));
     meta.set("patterns", std::move(patterns_));
     content_.meta = meta.dump();
-    content_.summary = content_summary_of(content_);
+    finish_content(content_);
     return std::move(content_);
   }
 
@@ -134,13 +134,13 @@ class Linker {
       chunk.first_level += static_cast<std::uint32_t>(content_.levels.size());
       content_.chunks.push_back(chunk);
     }
-    add_stand_ins(part, model, first_material);
+    add_proxies(part, model, first_material);
     const std::uint32_t own = part.levels().own().size();
     for (std::uint32_t l = 0; l < part.levels().size(); ++l) {
       LevelRecord level = part.levels()[l];
       level.vertex_offset += content_.vertices.size();
       level.index_offset += content_.indices.size();
-      (l < own ? content_.levels : content_.stand_in_levels).push_back(level);
+      (l < own ? content_.levels : content_.proxy_levels).push_back(level);
     }
     content_.vertices.insert(content_.vertices.end(), part.vertices().begin(),
                              part.vertices().end());
@@ -148,21 +148,20 @@ class Linker {
   }
 
   /// All but their levels, which are added with those of the model.
-  void add_stand_ins(const BundleView& part, const ModelRecord& model,
-                     std::uint32_t first_material) {
+  void add_proxies(const BundleView& part, const ModelRecord& model, std::uint32_t first_material) {
     const std::uint32_t chunks = part.chunks().own().size();
     const std::uint32_t levels = part.levels().own().size();
-    for (StandInRecord record : part.stand_ins()) {
+    for (ProxyRecord record : part.proxies()) {
       record.model = static_cast<std::uint32_t>(content_.models.size());
-      record.first_chunk += static_cast<std::uint32_t>(content_.stand_in_chunks.size()) - chunks;
-      content_.stand_ins.push_back(record);
+      record.first_chunk += static_cast<std::uint32_t>(content_.proxy_chunks.size()) - chunks;
+      content_.proxies.push_back(record);
     }
-    const auto first_level = static_cast<std::uint32_t>(content_.stand_in_levels.size());
+    const auto first_level = static_cast<std::uint32_t>(content_.proxy_levels.size());
     for (std::uint32_t c = chunks; c < part.chunks().size(); ++c) {
       ChunkRecord chunk = part.chunks()[c];
       chunk.material = chunk.material - model.first_material + first_material;
       chunk.first_level += first_level - levels;
-      content_.stand_in_chunks.push_back(chunk);
+      content_.proxy_chunks.push_back(chunk);
     }
   }
 
@@ -199,15 +198,15 @@ class Linker {
     const BundleView& part = linked.bundle;
     PatternRecord record = part.patterns()[0];
     record.name = content_.intern(linked.name);
-    for (const SectionType type :
-         {SectionType::kTrackerRecord, SectionType::kPatternColours, SectionType::kPatternShape}) {
+    for (const SectionType type : {SectionType::kTrackerRecord, SectionType::kPatternColours,
+                                   SectionType::kPatternShape, SectionType::kPatternPicture}) {
       add_extra(part, type, 0, static_cast<std::uint32_t>(content_.patterns.size()));
     }
     std::vector<FeatureContent> features;
     for (const ParameterSetRecord& each : part.parameter_sets()) {
       const std::uint32_t set = each.id;
       const FeatureView view = part.features(0, set);
-      if (view.descriptor_bytes == 0) continue;
+      if (!linked.keypoints || view.descriptor_bytes == 0) continue;
       features.push_back({set,
                           view.descriptor_bytes,
                           {view.keypoints.begin(), view.keypoints.end()},

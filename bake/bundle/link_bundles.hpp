@@ -17,6 +17,7 @@ struct LinkPart {
   BundleView bundle;                    ///< its bytes outlive the link
   std::string name;                     ///< of the model or the pattern in the new bundle
   std::array<double, 3> model_sides{};  ///< BakeTrace::model_sides of a model
+  bool keypoints = true;                ///< with a pattern's, of the ModAR paper's method
 };
 
 /// A video or sound made fit, as a bundle of its one MediaRecord and, of a video, its poster's

@@ -76,7 +76,8 @@ Result<void> check_model(const std::string& path) {
     cause = "this is not a regular file";
   }
   if (cause == nullptr) return {};
-  return fail(ExitCode::kIo, "io.open", path, cause, "check the path and its permissions");
+  return missing_file(
+      path, {ExitCode::kIo, "io.open", path, cause, "check the path and its permissions"});
 }
 
 }  // namespace
@@ -146,11 +147,11 @@ Result<void> require_shown(const BakeRequest& request) {
     if (shown(model.name, &SceneRequest::model)) continue;
     const std::string on = next < idle.size() ? idle[next++] : request.patterns.front().name;
     lines += " --scene " + on + "=" + model.name;
-    if (what.empty()) what = "the model '" + model.name + "' stands on no pattern";
+    if (what.empty()) what = "the model '" + model.name + "' is on no pattern";
   }
   for (; next < idle.size(); ++next) {
     lines += " --scene " + idle[next] + "=" + request.models.front().name;
-    if (what.empty()) what = "no model stands on the pattern '" + idle[next] + "'";
+    if (what.empty()) what = "no model is on the pattern '" + idle[next] + "'";
   }
   if (lines.empty()) return {};
   return fail(ExitCode::kUsage, "bake.never-shown", "", what + ", so it would never be shown",

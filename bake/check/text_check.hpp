@@ -10,7 +10,7 @@
 
 namespace modar {
 
-/// What a project has its visitors read where a model stands on a pattern.
+/// A project's texts for visitors where a pattern has a model.
 struct SceneText {
   std::string pattern;
   std::string model;

@@ -14,6 +14,8 @@
 namespace modar {
 namespace {
 
+constexpr const char* kRebake = "bake the bundle again; if that does not help, report it as a bug";
+
 constexpr IssueKind kKinds[] = {
     {"DEVICE_TEXTURE_SIZE", Severity::kError, "A texture is larger than the device can hold",
      "bake with --device, or with a smaller --max-texture"},
@@ -36,25 +38,28 @@ constexpr IssueKind kKinds[] = {
      "split it into several bundles"},
     {"DEVICE_STORAGE", Severity::kError, "The bundle takes more than half of the device's storage",
      "split it, or ship it compressed with smaller textures"},
-    {"DEVICE_HALF_FLOAT", Severity::kWarning,
-     "The device has no half-float vertices: the player converts them on upload",
-     "bake with --positions int16, unless these attributes may take twice the memory"},
-    {"DEVICE_ETC1", Severity::kWarning,
-     "The device has no ETC1 textures: the player decodes them on upload",
-     "none needed if textures may take six times the memory"},
+    {"DEVICE_HALF_FLOAT", Severity::kInfo,
+     "The device cannot read 16-bit floats: the player converts the model's coordinates when it "
+     "loads them, which takes memory and loses nothing",
+     "none needed; --positions int16 saves this memory"},
+    {"DEVICE_ETC1", Severity::kInfo,
+     "The device cannot read ETC1 textures: the player unpacks them when it loads them, which "
+     "takes "
+     "memory and loses nothing",
+     "none needed; smaller textures (--max-texture) take less"},
     {"SOURCE_MISSING", Severity::kWarning, "No file of --source is this asset's source",
      "pass all files that the bundle was baked from"},
     {"SOURCE_BYTES", Severity::kInfo, "Baking this asset again gives different bytes",
-     "none needed if the source, the options or this program changed; differences are measured"},
+     "none needed: another version of this program baked it; visible differences are reported"},
     {"SOURCE_SURFACE", Severity::kError,
-     "A model differs from its source by more than the bundle states",
+     "A model's surface, vertices or levels differ from its source's",
      "bake it again from this source; if that does not help, report it as a bug"},
     {"SOURCE_COLOUR", Severity::kError, "Colours differ from those of the source",
      "bake it again from this source"},
     {"SOURCE_COUNTS", Severity::kError, "Counts differ from those of the source",
      "bake it again from this source"},
     {"SOURCE_PATTERN", Severity::kError,
-     "A pattern's image, its codes or its physical width differ from its source's",
+     "A pattern's image, codes, shape, width or parameters differ from its source's",
      "bake it again from this source; give its width as FILE:WIDTHmm if it was baked with one"},
     {"SOURCE_SCENE", Severity::kError,
      "A scene differs from the one that the bundle was baked with",
@@ -64,9 +69,27 @@ constexpr IssueKind kKinds[] = {
      "use a picture with more texture, evenly spread, or a larger print"},
     {"VISUAL_DIFFERS", Severity::kError, "A model does not look like its source",
      "look at the picture of the worst view; bake with larger textures or a smaller --max-error"},
-    {"BUNDLE_FIRST_SIGHT", Severity::kWarning,
+    {"BUNDLE_PREVIEW", Severity::kWarning,
      "This is what can be shown of a bundle before all of it has come",
      "copy or download all of it: run modar-fetch again"},
+    {"META_DIFFERS", Severity::kError,
+     "The meta text describes other models, patterns, parameter sets or scenes than the bundle "
+     "holds",
+     kRebake},
+    {"RECORD_UNUSED", Severity::kError, "Nothing uses a name, a layout, a texture or a media file",
+     kRebake},
+    {"NUMBER_TINY", Severity::kError, "A number is smaller than any that a bake writes", kRebake},
+    {"MODEL_FIGURES", Severity::kError, "A model states figures that its chunks cannot have",
+     kRebake},
+    {"CHUNK_CONTENT", Severity::kError,
+     "What follows from a chunk's vertices and triangles differs from the stored values", kRebake},
+    {"TEXTURE_CONTENT", Severity::kError,
+     "A texture's figures contradict each other, or a level is not the half of the one before",
+     kRebake},
+    {"PATTERN_CONTENT", Severity::kError, "A pattern's features do not follow from its picture",
+     kRebake},
+    {"SCENE_CONTENT", Severity::kError,
+     "A scene's shadow does not follow from its model and its place", kRebake},
 };
 static_assert(std::size(kKinds) == static_cast<std::size_t>(WorkstationRule::kCount));
 
@@ -78,6 +101,12 @@ std::span<const IssueKind> workstation_issue_kinds() {
 
 const IssueKind& workstation_issue_kind(WorkstationRule rule) {
   return kKinds[static_cast<std::size_t>(rule)];
+}
+
+Verdict device_verdict(const BundleView& bundle, const DeviceProfile& device) {
+  Verdict verdict;
+  check_device(bundle, device, [&](const Issue& issue) { verdict.add(issue); });
+  return verdict;
 }
 
 std::vector<const IssueKind*> all_issue_kinds() {
@@ -140,11 +169,11 @@ std::map<std::string, std::size_t> Verdict::left_out() const {
 
 namespace {
 
-void tell_of_first_sight(const BundleView& bundle, const IssueSink& sink) {
+void report_preview(const BundleView& bundle, const IssueSink& sink) {
   const std::string_view meta = bundle.meta();
-  if (!meta.starts_with(kFirstSightMeta)) return;
+  if (!meta.starts_with(kPreviewMeta)) return;
   const auto* begin = reinterpret_cast<const std::byte*>(meta.data());
-  sink({&workstation_issue_kind(WorkstationRule::kFirstSight), "meta",
+  sink({&workstation_issue_kind(WorkstationRule::kPreview), "meta",
         static_cast<std::uint64_t>(begin - bundle.bytes().data()), "models and textures are coarse",
         std::nullopt});
 }
@@ -159,7 +188,7 @@ bool check_whole(std::span<const std::byte> bytes, const DeviceProfile* device,
   if (sound) sound = check_yml_twins(bytes, sink);
   if (!sound) return false;
   if (const auto bundle = BundleView::open(bytes)) {
-    tell_of_first_sight(*bundle, sink);
+    report_preview(*bundle, sink);
     if (device != nullptr) check_device(*bundle, *device, sink);
   }
   return true;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "formats/base/error.hpp"
+#include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
 #include "modar/device_profile.hpp"
 
@@ -36,7 +37,15 @@ enum class WorkstationRule : std::uint8_t {
   kSourceScene,
   kPoseRange,
   kVisualDiffers,
-  kFirstSight,
+  kPreview,
+  kMetaDiffers,
+  kUnused,
+  kNumberTiny,
+  kModelFigures,
+  kChunkContent,
+  kTextureContent,
+  kPatternContent,
+  kSceneContent,
   kCount
 };
 
@@ -77,9 +86,13 @@ class Verdict {
 
 /// All rules on a bundle's bytes, and those of a device where one is named: what `modar check` runs
 /// without sources. Gives back what it has read of a mapping. Answers true if the bytes are sound;
-/// what a device lacks is told to the sink alone.
+/// what a device lacks is reported to the sink alone.
 bool check_whole(std::span<const std::byte> bytes, const DeviceProfile* device,
                  const IssueSink& sink);
+
+/// What check_whole() says of a device alone. One verdict: `modar check`, the report and the studio
+/// call a device fit where it has no errors.
+Verdict device_verdict(const BundleView& bundle, const DeviceProfile& device);
 
 /// Every kind of issue that `modar check` knows: those of formats/, then those of the workstation.
 std::vector<const IssueKind*> all_issue_kinds();

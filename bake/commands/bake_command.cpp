@@ -3,12 +3,14 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
 #include <thread>
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/bundle/bundle_json.hpp"
+#include "bake/bundle/files/sorted_files.hpp"
 #include "bake/check/source/reproduce.hpp"
 #include "bake/commands/bake_options.hpp"
 #include "bake/commands/commands.hpp"
@@ -38,22 +40,39 @@ struct BakeCommand {
   std::vector<std::string> patterns;
   std::vector<std::string> scenes;
   OptionTexts texts;
+  std::vector<Diagnostic> said;  ///< of the files, before the bake
   ProjectCommand project;
 };
 
-/// Sorts the files that no option names into pictures, by their endings, and models.
-Result<void> sort_files(BakeCommand& command) {
-  for (std::string& text : command.files) {
+/// Sorts the files that no option names into pictures and models. Of files that are not read the
+/// rest is baked, as `modar init` does, unless they were the only ones of their kind.
+Result<void> take_files(BakeCommand& command) {
+  std::map<std::string, std::string> texts;  // by path
+  std::vector<std::string> paths;
+  for (const std::string& text : command.files) {
     std::error_code ignored;
     if (std::filesystem::is_directory(text, ignored)) {
       return fail(ExitCode::kUsage, "bake.folder", text, "a folder is baked as a project",
                   "run `modar init` and `modar bake` in it");
     }
     MODAR_ASSIGN(const PatternRequest picture, parse_pattern(text));
-    const bool is_picture = is_picture_file(picture.path) || is_foreign_picture_file(picture.path);
-    (is_picture ? command.patterns : command.models).push_back(std::move(text));
+    texts[picture.path] = text;
+    paths.push_back(picture.path);
   }
-  command.files.clear();
+  const SortedFiles sorted = sort_files(paths);
+  for (const std::string& path : sorted.pictures) command.patterns.push_back(texts[path]);
+  for (const auto* list : {&sorted.models, &sorted.others}) {
+    for (const std::string& path : *list) {
+      if (!is_material_file(path)) command.models.push_back(texts[path]);
+    }
+  }
+  for (const LeftOut& one : sorted.left_out) {
+    const bool picture = is_picture_file(one.file) || is_foreign_picture_file(one.file);
+    const bool only = picture ? command.patterns.empty() : command.models.empty();
+    if (only || one.error.exit != ExitCode::kUnsupported) return tl::unexpected(one.error);
+    command.said.push_back({one.error.code, DiagnosticSeverity::kWarning, one.file, 0,
+                            "left out: " + one.error.cause, one.error.cure});
+  }
   return {};
 }
 
@@ -79,6 +98,7 @@ Result<void> complete(BakeCommand& command) {
   for (const std::string& text : command.models) request.models.push_back(parse_model(text));
   for (const std::string& text : command.patterns) {
     MODAR_ASSIGN(PatternRequest pattern, parse_pattern(text));
+    MODAR_TRY(find_picture(pattern, command.said));
     request.patterns.push_back(std::move(pattern));
   }
   for (const std::string& text : command.scenes) {
@@ -88,6 +108,15 @@ Result<void> complete(BakeCommand& command) {
   }
   request.tool_version = MODAR_VERSION;
   return name_assets(request);
+}
+
+/// What of the files is not in the bundle and would be missed, as the last lines.
+void print_losses(const Report& report) {
+  for (const Diagnostic& d : report.diagnostics) {
+    const bool lost = d.id == "model.lost" || d.id.ends_with("missing-map") ||
+                      d.id.ends_with("missing-image") || d.id.ends_with("missing-texture");
+    if (lost) std::fprintf(stderr, "not complete: %s\n", printable(d.message).c_str());
+  }
 }
 
 void print_summary(const BundleView& bundle, const Report& report, const std::string& path) {
@@ -136,7 +165,7 @@ void report_memory(const BakeRequest& request, Report& report) {
   const std::uint64_t peak = process_cost().peak_rss_bytes;
   if (request.memory_bytes == 0 || peak <= request.memory_bytes) return;
   report.diagnostics.push_back({"bake.memory", DiagnosticSeverity::kWarning, "--memory", 0,
-                                "the bake took " + human_bytes(peak) + ", more than was asked",
+                                "the bake took " + human_bytes(peak) + ", more than requested",
                                 "fewer --jobs, smaller textures or several bundles take less"});
 }
 
@@ -165,12 +194,12 @@ Json bake_json(const BundleView& bundle, const Report& report) {
           {"peak_rss_bytes", cost.peak_rss_bytes}};
 }
 
-/// A bundle of an OBJ takes a fifth of its bytes (12.5 of some 60 a triangle) and more with levels
-/// and textures: who has not even an eighth free need not start.
+/// Bytes of an OBJ per byte of its bundle at most. Less free disk than that cannot hold any bundle
+/// of it.
 constexpr std::uint64_t kSourceBytesPerBundleByte = 8;
 
-/// Refuses to write over what is no bundle by its name and its bytes: textures and material files,
-/// which the models name, are known only later.
+/// Refuses to write over a file that is no bundle by its name and its bytes: textures and material
+/// files, which the models name, are known only later.
 Result<void> keep_other_files(const std::string& output) {
   if (output.ends_with(".modar")) return {};
   return keep_other_kinds(output, "bundle", [](std::string_view start) {
@@ -194,7 +223,7 @@ Result<void> try_outputs(const BakeCommand& command) {
 }
 
 Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& words) {
-  MODAR_TRY(sort_files(command));
+  MODAR_TRY(take_files(command));
   if (command.models.empty() && command.patterns.empty()) {
     return run_project(command.project,
                        {command.request.jobs, command.request.memory_bytes, command.quiet,
@@ -213,6 +242,7 @@ Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& 
   }
   ProgressBar bar(command.quiet, command.progress_json);
   Report report;
+  report.diagnostics = command.said;
   report.progress = [&](const std::string& stage, double done) { bar.show(stage, done); };
 
   Result<BundleContent> content = build_bundle(command.request, report);
@@ -225,7 +255,7 @@ Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& 
   StageTimer writing(report, "write");
   MODAR_TRY(save_bundle(*content, command.output));
 
-  // What is told of the bundle is read back from the file, so that it is true of the file.
+  // The report of the bundle is read back from the file, so that it is true of the file.
   MODAR_ASSIGN(auto file, MappedFile::open(command.output));
   MODAR_ASSIGN(auto bundle, BundleView::open(file.bytes()));
   if (command.prove_reproducible) {
@@ -237,7 +267,10 @@ Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& 
   }
   writing.done(content->models.size() + content->patterns.size(), file.bytes().size());
   bar.clear();
-  if (!command.quiet) print_summary(bundle, report, command.output);
+  if (!command.quiet) {
+    print_summary(bundle, report, command.output);
+    print_losses(report);
+  }
   if (command.json) std::fputs(bake_json(bundle, report).dump().c_str(), stdout);
   return ExitCode::kOk;
 }
@@ -249,15 +282,17 @@ void add_input_options(CommandLine& line, BakeCommand& command) {
   line.option("--model", &command.models,
               "OBJ, glTF, GLB, PLY or STL files; NAME=FILE gives the model another name",
               {.type = "[NAME=]FILE"});
-  line.option("--pattern", &command.patterns,
-              "Frontal pictures of flat things; :210mm, :21cm or :8.3in states the printed width; "
-              ":shape=cylinder,diameter=66mm,arc=120 is a label around a bottle, "
-              ":shape=cone,top=80mm,bottom=60mm,arc=100 one around a cup, "
-              ":shape=box,size=120x180x40mm,right=FILE a box (also back, left, top and bottom)",
-              {.type = "FILE[:WIDTH][:shape=...]"});
+  line.option(
+      "--pattern", &command.patterns,
+      "Pictures of flat things, or photos in which their corners are found (:shape=flat takes the "
+      "whole file); :210mm, :21cm or :8.3in states the printed width; "
+      ":shape=cylinder,diameter=66mm,arc=120 is a label around a bottle, "
+      ":shape=cone,top=80mm,bottom=60mm,arc=100 one around a cup, "
+      ":shape=box,size=120x180x40mm,right=FILE a box (also back, left, top and bottom)",
+      {.type = "FILE[:WIDTH][:shape=...]"});
   line.option(
       "--scene", &command.scenes,
-      "Which model stands on which pattern (required if there are several of either), and how: "
+      "Which model is on which pattern (required if there are several of either), and how: "
       "height=120mm or width=80mm or scale=0.8 (of the pattern's longest side), up=x|y|z|-x|-y|-z, "
       "turn=DEGREES or turn=X:Y:Z, offset=X:Y:Z (in mm if the pattern's width is known, else in "
       "longest sides), centred, light=FILE",

@@ -84,7 +84,7 @@ void add_bake_options(CommandLine& line, OptionGroup group, BakeRequest& request
 
 Result<void> take_texts(const OptionTexts& texts, BakeRequest& request) {
   for (const auto& [option, text] : texts) {
-    if (!text.empty()) MODAR_TRY(take_option(*option, text, request));
+    if (!text.empty()) MODAR_TRY(parse_option(*option, text, request));
   }
   plan_request(request);
   return {};

@@ -12,11 +12,11 @@ namespace modar {
 /// Options whose value is a text, as the command line has it.
 using OptionTexts = std::map<const BakeOption*, std::string>;
 
-/// Declares the options of one heading. What is no text goes to the request at once.
+/// Declares the options of one heading. Values other than texts go to the request at once.
 void add_bake_options(CommandLine& line, OptionGroup group, BakeRequest& request,
                       OptionTexts& texts);
 
-/// Takes the texts, after the command line was read. Errors: those of take_option().
+/// Takes the texts, after the command line was read. Errors: those of parse_option().
 Result<void> take_texts(const OptionTexts& texts, BakeRequest& request);
 
 }  // namespace modar

@@ -15,7 +15,7 @@ void add_source_options(CommandLine& line, CheckCommand& check) {
   line.group("Compare with the sources");
   line.option("--source", &check.sources,
               "Bake these models and pattern images again, compare, and measure what differs; "
-              "modar.toml stands for all files of a project",
+              "modar.toml means all files of a project",
               {.type = "FILE[:WIDTHmm]"});
   line.flag("--pose", check.pose,
             "Track the patterns of --source in rendered views: error and working range",

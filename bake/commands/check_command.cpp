@@ -1,10 +1,12 @@
 // `modar check`: is this bundle good? Verdict first, then one line an issue.
 #include "bake/commands/check_command.hpp"
 
+#include <algorithm>
 #include <cinttypes>
 #include <cstdio>
 #include <string>
 
+#include "bake/check/content/content_check.hpp"
 #include "bake/check/device/device_file.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/io/terminal.hpp"
@@ -15,14 +17,20 @@
 namespace modar {
 namespace {
 
+/// " (byte 19600)" of the file's faults; what a device lacks is not at a place in it.
+std::string place_of(const Issue& issue) {
+  const auto kinds = workstation_issue_kinds();
+  const bool of_file = std::ranges::none_of(kinds, [&](const auto& k) { return &k == issue.kind; });
+  return of_file ? " (byte " + std::to_string(issue.offset) + ")" : "";
+}
+
 void print_issues(const std::string& path, const Verdict& verdict) {
   std::printf("%s: %s\n", path.c_str(), verdict.good() ? "good" : "BAD");
   for (const WeighedIssue& weighed : verdict.issues()) {
     const Issue& issue = weighed.issue;
-    std::printf("%s %s %s (byte %llu): %s%s%s; %s\n", severity_name(weighed.severity),
-                issue.kind->id, issue.where.c_str(), static_cast<unsigned long long>(issue.offset),
-                issue.kind->message, issue.detail.empty() ? "" : ": ", issue.detail.c_str(),
-                issue.kind->cure);
+    std::printf("%s %s %s%s: %s%s%s; %s\n", severity_name(weighed.severity), issue.kind->id,
+                issue.where.c_str(), place_of(issue).c_str(), issue.kind->message,
+                issue.detail.empty() ? "" : ": ", issue.detail.c_str(), issue.kind->cure);
   }
   for (const auto& [id, count] : verdict.left_out()) {
     std::printf("... and %zu more of %s\n", count, id.c_str());
@@ -77,13 +85,15 @@ void print_ranges(const std::vector<PatternRange>& ranges) {
 
 void print_fit(const SourceFit& fit) {
   for (const ModelFit& model : fit.models) {
+    if (model.same_bytes) {
+      std::printf("model '%s': a second bake gave the same bytes; an error of %.3g is stated\n",
+                  model.name.c_str(), model.stated_error);
+      continue;
+    }
     std::printf(
-        "model '%s': %s; the source deviates from the bundle by up to %.3g, the bundle from the "
-        "source by up to %.3g; %.3g is stated\n",
-        model.name.c_str(),
-        model.same_bytes ? "a second bake gave the same bytes"
-                         : "a second bake gave different bytes",
-        model.source_to_bundle, model.bundle_to_source, model.stated_error);
+        "model '%s': a second bake gave different bytes; it is up to %.3g from the bundle, the "
+        "bundle up to %.3g from it; %.3g is stated\n",
+        model.name.c_str(), model.source_to_bundle, model.bundle_to_source, model.stated_error);
   }
   for (const std::string& asset : fit.same) {
     std::printf("%s: a second bake gave the same bytes\n", asset.c_str());
@@ -111,12 +121,15 @@ int run_check(const CheckCommand& command) {
   if (*device != nullptr) extras.device = (*device)->name;
   if (sound) {
     const Result<BundleView> bundle = BundleView::open(file->bytes());
+    check_content(*bundle, sink, {.jobs = command.jobs});
     if (!command.sources.empty()) {
       if (auto done = check_against_sources(*bundle, command, sink, extras); !done) {
         return print_error(done.error());
       }
     }
   }
+
+  if (const auto same = file->intact(); !same) return print_error(same.error());
 
   if (command.sarif) {
     std::fputs(check_sarif(verdict, command.bundle, command.tool_version).c_str(), stdout);

@@ -22,7 +22,7 @@ struct CheckExtras {
 /// `modar check --json`; its schema is bake/commands/check.schema.json.
 std::string check_json(const Verdict& verdict, const CheckExtras& extras);
 
-/// `modar check --sarif`: SARIF 2.1.0 for systems that show findings beside code.
+/// `modar check --sarif`: SARIF 2.1.0 for systems that show findings next to code.
 /// path: of the bundle, as the user wrote it.
 std::string check_sarif(const Verdict& verdict, const std::string& path,
                         const std::string& tool_version);

@@ -10,6 +10,7 @@
 #include "bake/import/read_model.hpp"
 #include "bake/io/output.hpp"
 #include "bake/io/terminal.hpp"
+#include "bake/options/options.hpp"
 #include "bake/options/request_text.hpp"
 #include "bake/project/project.hpp"
 #include "formats/base/path.hpp"
@@ -75,8 +76,8 @@ Result<void> take_project(const BundleView& bundle, const std::string& path, Sou
   return {};
 }
 
-/// Did the bake take a picture that is named as the model? What it knew of patterns may be more
-/// than what is given here.
+/// Did the bake take a picture that is named as the model? Its knowledge of patterns may exceed the
+/// arguments here.
 bool has_own_picture(const BundleView& bundle, const ModelRequest& model) {
   const std::string stem = file_stem(model.path);
   for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
@@ -99,14 +100,18 @@ Result<Sources> read_sources(const BundleView& bundle, const CheckCommand& comma
       request.patterns.push_back(std::move(pattern));
     }
   }
-  for (std::uint32_t set = 0; set < bundle.parameter_sets().size(); ++set) {
-    request.parameters.emplace_back(bundle.name(bundle.parameter_sets()[set].name));
-  }
-  if (request.parameters.empty()) request.parameters = {"none"};
   read_bake_options(bundle.meta(), request);
+  std::vector<std::string> stored;
+  for (const ParameterSetRecord& set : bundle.parameter_sets()) {
+    stored.emplace_back(bundle.name(set.name));
+  }
+  if (stored_parameters(request) != stored) {
+    request.parameters = stored.empty() ? std::vector<std::string>{"none"} : stored;
+  }
   MODAR_TRY(name_assets(request));
   for (ModelRequest& model : request.models) model.own_picture = has_own_picture(bundle, model);
   request.jobs = command.jobs;
+  request.tool_version = command.tool_version;
   return sources;
 }
 
@@ -137,6 +142,7 @@ Result<std::vector<ModelLook>> compare_looks(const BundleView& bundle, const Che
   options.models = request.models;
   options.picture_folder = command.visual;
   options.jobs = command.jobs;
+  options.crease = request.crease_degrees();
   ProgressBar bar(command.json || command.sarif);
   options.progress = [&bar](double done) { bar.show("look", done); };
   return check_looks(bundle, options, sink);

@@ -109,7 +109,7 @@ std::string wrapped(const std::string& text, std::size_t width) {
 }
 
 /// Options without their validators' notes, which apply() has put into words, in lines of 80
-/// columns. Leaves out what --help-all alone shows, unless that is asked for.
+/// columns. Leaves out what --help-all alone shows, unless requested.
 class HelpFormatter : public CLI::Formatter {
  public:
   explicit HelpFormatter(std::shared_ptr<std::set<const void*>> in_full)
@@ -216,7 +216,7 @@ std::optional<Error> unknown_word(const CLI::App* app) {
                is_option ? "there is no such option" : "there is no such command", cure};
 }
 
-/// The option that CLI11's message is about: the longest name that stands in it.
+/// The option that CLI11's message is about: the longest name in it.
 const CLI::Option* option_in(const CLI::App& app, const std::string& message) {
   const CLI::Option* found = nullptr;
   std::size_t longest = 0;
@@ -244,27 +244,8 @@ std::optional<double> number_in(const std::string& text) {
   return end != text.c_str() && *end == '\0' ? std::optional(value) : std::nullopt;
 }
 
-/// "210" for "21cm" behind an option of millimetres.
-std::string in_millimetres(const std::string& text) {
-  constexpr std::pair<const char*, double> kUnits[] = {
-      {"mm", 1}, {"cm", 10}, {"in", 25.4}, {"m", 1000}};
-  for (const auto& [unit, mm] : kUnits) {
-    if (!text.ends_with(unit)) continue;
-    const auto value = number_in(text.substr(0, text.size() - std::string(unit).size()));
-    char digits[32];
-    if (value) return std::snprintf(digits, sizeof digits, "%.6g", *value * mm), digits;
-  }
-  return "";
-}
-
 /// What a value should have been, and an example.
-std::string number_cure(const OptionRules& rules, const std::string& name,
-                        const std::string& value) {
-  if (name.ends_with("-mm")) {
-    const std::string meant = in_millimetres(value);
-    return meant.empty() ? "write millimetres, as in " + name + " 210"
-                         : "write millimetres: " + name + " " + meant;
-  }
+std::string number_cure(const OptionRules& rules, const std::string& name) {
   char text[96];
   if (rules.positive || (rules.least == 0 && rules.most > 1e300)) {
     return std::string("write a number ") + (rules.positive ? "above 0" : "from 0 on");
@@ -303,7 +284,7 @@ Error usage_error(const CLI::ParseError& thrown, const CLI::Option* option,
     error.cure = meant.empty() ? "name one of " + list : "did you mean " + std::string(meant) + "?";
   } else {
     error.cause = quoted + (number_in(value) ? " is out of range" : " is not a number");
-    error.cure = number_cure(rules, name, value);
+    error.cure = number_cure(rules, name);
   }
   return error;
 }

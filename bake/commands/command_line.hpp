@@ -52,7 +52,7 @@ struct CommandText {
   std::vector<CommandText> commands;
 };
 
-/// Which help shows what is declared: --help and --help-all, or --help-all alone.
+/// Which help shows the declared options: --help and --help-all, or --help-all alone.
 enum class Shown { kAlways, kInFull };
 
 /// A command with its options and subcommands. Variables must live until parse_and_run() returns.

@@ -23,15 +23,15 @@ struct InspectCommand {
 
 void print_models(const BundleView& bundle) {
   if (bundle.models().empty()) return;
-  std::printf("\n%-18s %11s %11s %7s %5s %10s %14s %10s\n", "model", "triangles", "vertices",
-              "chunks", "lods", "diagonal", "max error", "of diag.");
+  std::printf("\n%-18s %11s %11s %7s %10s %14s %10s\n", "model", "triangles", "vertices", "chunks",
+              "diagonal", "max error", "of diag.");
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
     const ModelRecord& model = bundle.models()[m];
-    std::printf("%-18s %11llu %11llu %7u %5u %10.5g %14.3g %10.2g\n",
+    std::printf("%-18s %11llu %11llu %7u %10.5g %14.3g %10.2g\n",
                 std::string(bundle.name(model.name)).c_str(),
                 static_cast<unsigned long long>(model.triangle_count),
                 static_cast<unsigned long long>(model.vertex_count), model.chunk_count,
-                model.level_count, model.diagonal, model.position_error_max,
+                model.diagonal, model.position_error_max,
                 model.diagonal > 0 ? model.position_error_max / model.diagonal : 0.0);
     if (const auto topology = stated_topology(bundle, m)) {
       std::printf("  %s\n", topology_words(*topology).c_str());
@@ -99,9 +99,10 @@ void print_table(const BundleView& bundle, const std::string& path) {
 Result<ExitCode> run_inspect(const InspectCommand& command) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(command.bundle));
   Result<BundleView> bundle = BundleView::open(file.bytes());
-  if (!bundle) return in_file(command.bundle, bundle.error());
+  if (!bundle) return file.settle(Result<ExitCode>(in_file(command.bundle, bundle.error())));
   if (!command.extract.empty()) {
-    MODAR_ASSIGN(const auto files, extract_bundle(*bundle, command.extract, command.force));
+    MODAR_ASSIGN(const auto files,
+                 file.settle(extract_bundle(*bundle, command.extract, command.force)));
     for (const std::string& name : files) std::fprintf(stderr, "wrote %s\n", name.c_str());
   }
   if (command.json) {
@@ -109,7 +110,7 @@ Result<ExitCode> run_inspect(const InspectCommand& command) {
   } else {
     print_table(*bundle, command.bundle);
   }
-  return ExitCode::kOk;
+  return file.settle(Result<ExitCode>(ExitCode::kOk));
 }
 
 }  // namespace

@@ -3,18 +3,26 @@
 
 #include "bake/commands/commands.hpp"
 #include "bake/io/terminal.hpp"
+#include "modar/mapped_file.hpp"
 
 int main(int argc, char** argv) {
+  modar::guard_mapped_files();
   const int code = modar::guarded([&] {
     modar::CommandLine program("Bake models and pictures for augmented reality on old phones",
                                std::string("modar ") + MODAR_VERSION);
     program.group("Commands to start with");
+#ifdef MODAR_HAS_STUDIO
     modar::add_studio(program);
+#endif
     modar::add_pattern(program);
     modar::add_bake(program);
     modar::add_check(program);
+#ifdef MODAR_HAS_PAGE
     modar::add_report(program);
+#endif
+#ifdef MODAR_HAS_WEB
     modar::add_web(program);
+#endif
     modar::add_init(program);
     program.group("Look closer", modar::Shown::kInFull);
     modar::add_inspect(program);

@@ -24,7 +24,9 @@ namespace {
 struct RectifyCommand {
   std::string photo;
   std::string corners;  ///< empty: they are looked for
-  std::string picture;  ///< of the corners that were found; empty: beside the output
+  std::string picture;  // /< of the corners that were found; empty: next to the output
+  std::string width;    ///< with a unit, as is the height
+  std::string height;
   RectifyOptions options;
   std::string output;
   bool doubtful = false;  ///< the corners that were found
@@ -59,6 +61,7 @@ struct SimulateCommand {
   std::string backgrounds;            ///< folder; empty: made ones
   std::string picture_folder;         ///< of contact sheets; empty: none
   std::string shape;                  ///< of parse_shape(); empty: flat
+  std::string width;                  ///< with a unit
   SimulateOptions options;
   bool quiet = false;
   bool json = false;
@@ -86,6 +89,17 @@ Json corners_json(const std::array<PixelPoint, 4>& corners) {
 }
 
 /// The corners of --corners, or those that are found, shown in a picture.
+Result<void> take_length(const char* option, const std::string& text, double& mm) {
+  if (text.empty()) return {};
+  const auto length = parse_millimetres(text);
+  if (!length) {
+    return fail(ExitCode::kUsage, "cli.length", option + (" " + text), length.error().cause,
+                length.error().cure);
+  }
+  mm = *length;
+  return {};
+}
+
 Result<void> take_corners(RectifyCommand& command, const RgbaImage& photo) {
   if (!command.corners.empty()) {
     MODAR_ASSIGN(command.options.corners, parse_corners(command.corners));
@@ -101,21 +115,16 @@ Result<void> take_corners(RectifyCommand& command, const RgbaImage& photo) {
   MODAR_TRY(write_png(picture, command.picture));
   std::fprintf(stderr, "found the corners %s, see %s; if they are wrong, pass --corners\n",
                corners_text(found.corners).c_str(), command.picture.c_str());
-  const char* doubt = found.sharpness < kDoubtfulSharpness ? "an edge is hidden or blurred"
-                      : found.framed
-                          ? "there are edges around or beyond them, perhaps those of the sheet"
-                      : found.fills ? "they fill the photo, which may already be the picture"
-                                    : nullptr;
-  command.doubtful = doubt != nullptr;
+  command.doubtful = *found.doubt() != 0;
   if (command.doubtful) {
     print_diagnostic({"rectify.doubtful", DiagnosticSeverity::kWarning, command.photo, 0,
-                      std::string("the corners may be wrong: ") + doubt,
+                      "the corners may be wrong: " + std::string(doubt_words(found.doubt())),
                       "look at " + command.picture + ", and pass the right ones with --corners"});
   }
   return {};
 }
 
-/// What was written, and how well its shape is known.
+/// The output, and how well its shape is known.
 void print_rectified(const RectifyCommand& command, const Rectified& done) {
   // The player measures aspects that are off by less as soon as it sees the thing.
   constexpr double kWellKnown = 0.02;
@@ -131,16 +140,17 @@ void print_rectified(const RectifyCommand& command, const Rectified& done) {
   std::snprintf(cause, sizeof cause,
                 "the side lengths are estimated from perspective, with an uncertainty of %.0f %%",
                 100 * aspect.spread / aspect.aspect);
-  print_diagnostic(
-      {"rectify.aspect", DiagnosticSeverity::kWarning, command.photo, 0, cause,
-       command.options.width_mm > 0
-           ? "measure the height, and give --height-mm"
-           : "measure the sides and give --width-mm and --height-mm, or take a frontal "
-             "photo"});
+  print_diagnostic({"rectify.aspect", DiagnosticSeverity::kWarning, command.photo, 0, cause,
+                    command.options.width_mm > 0
+                        ? "measure the height, and give --height"
+                        : "measure the sides and give --width and --height, or take a frontal "
+                          "photo"});
 }
 
 Result<ExitCode> run_rectify(RectifyCommand& command) {
   if (!command.corners.empty()) MODAR_TRY(parse_corners(command.corners));
+  MODAR_TRY(take_length("--width", command.width, command.options.width_mm));
+  MODAR_TRY(take_length("--height", command.height, command.options.height_mm));
   MODAR_TRY(keep_inputs(command.output, {command.photo}));
   if (!command.output.ends_with(".png") && !command.output.ends_with(".PNG")) {
     return fail(ExitCode::kUsage, "rectify.format", command.output,
@@ -186,20 +196,20 @@ void add_rectify(CommandLine& pattern) {
   line.option("--picture", &command->picture,
               "Picture of the detected corners (default: OUTPUT.corners.png)",
               {.type = "FILE", .excludes = "--corners"});
-  line.option("--width-mm", &command->options.width_mm, "Physical width of the thing",
-              {.positive = true});
-  line.option("--height-mm", &command->options.height_mm,
+  line.option("--width", &command->width, "Physical width of the thing, as in 210mm",
+              {.type = "LENGTH"});
+  line.option("--height", &command->height,
               "Physical height (default: estimated from the perspective, with its uncertainty)",
-              {.positive = true});
+              {.type = "LENGTH"});
   line.option("--max-side", &command->options.max_side, "Longest side of the result, in pixels",
               {.shows_default = true, .least = 16, .most = kMaxTextureSide});
   line.option("-o,--output", &command->output, "PNG file to write",
               {.type = "IMAGE", .required = true});
   line.flag("--json", command->json, "Print size, aspect and corners as JSON");
   line.footer(
-      example("  modar pattern rectify photo.jpg --width-mm 210 -o cover.png\n"
+      example("  modar pattern rectify photo.jpg --width 210mm -o cover.png\n"
               "  modar pattern rectify photo.jpg --corners 212,80,905,131,870,640,190,602"
-              " --width-mm 210 -o cover.png\n"));
+              " --width 210mm -o cover.png\n"));
   line.run([command] { return run_rectify(*command); });
 }
 
@@ -227,7 +237,7 @@ Result<std::string> picture_of(const std::string& path, const std::string& folde
   return out;
 }
 
-/// Prints what is wrong with one file, after which the others go on; the first such error is what
+/// Prints the fault of one file, after which the others continue; the first such error is what
 /// the command answers.
 void print_failure(const Error& error, ExitCode& answer) {
   print_error(error);
@@ -372,6 +382,7 @@ Result<Simulation> simulate_file(const SimulateCommand& command, const std::stri
 }
 
 Result<ExitCode> run_simulate(SimulateCommand& command) {
+  MODAR_TRY(take_length("--width", command.width, command.options.width_mm));
   MODAR_TRY(open_folders(command.patterns));
   MODAR_TRY(complete(command));
   if (!command.picture_folder.empty()) {
@@ -410,7 +421,8 @@ void add_simulate(CommandLine& pattern) {
               "Camera file (OpenCV's YML): intrinsics and resolution", {.type = "FILE"});
   line.option("--backgrounds", &command->backgrounds,
               "Folder of photos without the pattern (default: generated ones)", {.type = "DIR"});
-  line.option("--width-mm", &options.width_mm, "Printed width of the pattern", {.positive = true});
+  line.option("--width", &command->width, "Printed width of the pattern, as in 210mm",
+              {.type = "LENGTH"});
   line.option(
       "--shape", &command->shape,
       "Surface that it is printed on: cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,"
@@ -426,7 +438,7 @@ void add_simulate(CommandLine& pattern) {
   line.flag("--quiet", command->quiet, "No progress bar");
   line.flag("--json", command->json, "Print the figures as JSON");
   line.footer(
-      example("  modar pattern simulate cover.png --width-mm 200 --camera phone.yml"
+      example("  modar pattern simulate cover.png --width 200mm --camera phone.yml"
               " --picture sheets\n"));
   line.run([command] { return run_simulate(*command); });
 }
@@ -475,9 +487,10 @@ void print_confusion(const Confusion& confusion) {
     std::printf("\n");
   }
   for (const AlikePair& pair : confusion.alike_pairs()) {
-    std::printf("%s: %s and %s\n",
-                pair.told_apart ? "bake into one bundle, where they are told apart" : "keep apart",
-                confusion.names[pair.a].c_str(), confusion.names[pair.b].c_str());
+    std::printf(
+        "%s: %s and %s\n",
+        pair.told_apart ? "bake into one bundle, where they are distinguished" : "keep apart",
+        confusion.names[pair.a].c_str(), confusion.names[pair.b].c_str());
   }
   for (std::size_t i = 0; i < count; ++i) {
     if (confusion.mirrored[i] == 0) continue;

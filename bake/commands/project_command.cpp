@@ -13,12 +13,14 @@
 
 #include "bake/bundle/bundle_json.hpp"
 #include "bake/commands/commands.hpp"
+#include "bake/io/input.hpp"
 #include "bake/io/output.hpp"
 #include "bake/io/terminal.hpp"
 #include "bake/memory/memory_limit.hpp"
 #include "bake/process/process.hpp"
 #include "bake/project/project.hpp"
 #include "formats/base/atomic_file.hpp"
+#include "formats/base/path.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
 
@@ -32,7 +34,7 @@ void print_scenes(const BundleView& bundle) {
     const std::string name = std::string(bundle.name(bundle.patterns()[scene.pattern].name)) + "=" +
                              std::string(bundle.name(bundle.models()[scene.model].name));
     std::fprintf(stderr, "scene   %-16s %s%s\n", name.c_str(), scene_words(bundle, s).c_str(),
-                 s == 0 ? "; up=, turn= and height= in --scene change it" : "");
+                 s == 0 ? "; turn=180 if that is its back; up= and height= change the rest" : "");
   }
   if (count > kMostLines) {
     std::fprintf(stderr, "scene   and %u more: `modar inspect` lists them\n", count - kMostLines);
@@ -47,7 +49,7 @@ constexpr const char* kProjectWords[] = {"--project", "--cache",   "--cache-key"
                                          "--jobs",    "--memory",  "--quiet",        "--json",
                                          "--watch",   "--notes",   "--progress-json"};
 
-/// What of the bake stands on the command line would be ignored beside a project file.
+/// Options of the bake on the command line would be ignored with a project file.
 Result<void> refuse_other_options(const std::vector<std::string>& words) {
   for (const std::string& word : words) {
     const std::string name = word.substr(0, word.find('='));
@@ -90,7 +92,7 @@ Result<void> write_depfile(const std::string& path, const ProjectOutcome& outcom
   return write_file(path, std::string_view(text + "\n"));
 }
 
-/// A depfile of ours names its targets in a line of their own; those of compilers name inputs
+/// Our depfiles name their targets in a line of their own; those of compilers name inputs
 /// there.
 Result<void> keep_no_depfile(const std::string& path) {
   return keep_other_kinds(path, "depfile of modar", [](std::string_view start) {
@@ -270,7 +272,7 @@ void watch_project(const ProjectCommand& command, const std::string& file,
   constexpr std::chrono::milliseconds kLook(200);
   std::set<std::string> paths = {file};
   for (;;) {
-    // Before the bake: what is saved while it runs is a change.
+    // Before the bake: files saved while it runs are changes.
     std::string before = states_of(paths);
     const auto outcome = bake_once(command, file, common);
     if (!outcome) print_error(outcome.error());
@@ -316,6 +318,9 @@ Result<ExitCode> run_init(const InitCommand& command) {
       (std::filesystem::path(command.folder) / kProjectFile).lexically_normal();
   std::error_code error;
   if (!std::filesystem::exists(command.folder, error)) {
+    if (is_web_address(command.folder)) {
+      return missing_file(command.folder, {ExitCode::kIo, "io.folder", command.folder, "", ""});
+    }
     for (const char* folder : {"models", "patterns"}) {
       MODAR_TRY(make_output_folder((std::filesystem::path(command.folder) / folder).string()));
     }
@@ -331,8 +336,9 @@ Result<ExitCode> run_init(const InitCommand& command) {
   }
   MODAR_ASSIGN(const InitialProject initial, initial_project(command.folder));
   MODAR_TRY(write_file(path, std::string_view(initial.text)));
-  std::fprintf(stderr, "%s: written; review it, then run `modar bake` in its folder%s\n",
-               path.c_str(), initial.left_out.c_str());
+  for (const Diagnostic& one : initial.said) print_diagnostic(one);
+  std::fprintf(stderr, "%s: written; review it, then run `modar bake` in its folder\n",
+               path.c_str());
   return ExitCode::kOk;
 }
 
@@ -362,13 +368,6 @@ std::string ninja_quoted(const std::string& path) {
     out += c;
   }
   return out;
-}
-
-/// A word of a shell.
-std::string shell_quoted(const std::string& word) {
-  std::string out = "'";
-  for (const char c : word) out += c == '\'' ? "'\\''" : std::string(1, c);
-  return out + "'";
 }
 
 /// Text in a build file of Ninja, as the value of a variable.
@@ -402,7 +401,7 @@ std::string ninja_generator(const NinjaPlanCommand& command, const Project& proj
   return text + "\n\n";
 }
 
-/// An edge for each asset, which bakes it into the cache, and one for all bundles. Stamps stand for
+/// An edge for each asset, which bakes it into the cache, and one for all bundles. Stamps represent
 /// entries of the cache, whose names nobody knows before the bake.
 std::string ninja_plan(const NinjaPlanCommand& command, const Project& project,
                        const ProjectOutcome& planned) {

@@ -36,7 +36,7 @@ struct CommonOptions {
   bool progress_json = false;
 };
 
-/// How each scene's model stands, on stderr: whoever set nothing sees here what was chosen.
+/// How each scene's model stands, on stderr: whoever set nothing sees the chosen ones here.
 void print_scenes(const BundleView& bundle);
 
 /// words: of the command line, to refuse options that belong in the file.

@@ -15,10 +15,10 @@
 #include "bake/commands/ship_json.hpp"
 #include "bake/io/output.hpp"
 #include "bake/io/terminal.hpp"
+#include "bake/ship/http/http_reader.hpp"
 #include "bake/ship/keys/keys.hpp"
 #include "bake/ship/keys/root_draft.hpp"
 #include "bake/ship/release_folder.hpp"
-#include "bake/web/http_reader.hpp"
 #include "formats/base/atomic_file.hpp"
 #include "modar/device_profile.hpp"
 #include "modar/release.hpp"
@@ -41,7 +41,7 @@ std::string first_line(const std::string& text) {
   return line.ends_with('\r') ? line.substr(0, line.size() - 1) : line;
 }
 
-/// Asks on the terminal, without showing what is typed.
+/// Asks on the terminal, without an echo.
 Result<std::string> ask_pass_phrase() {
   if (::isatty(STDIN_FILENO) == 0) {
     return fail(ExitCode::kUsage, "key.pass-phrase", "", "the secret key is encrypted",
@@ -85,7 +85,11 @@ Result<void> write_secret(const std::string& path, const std::string& text) {
   auto written = write_file(path, std::string_view(text));
   ::umask(mask);
   if (written && ::chmod(path.c_str(), S_IRUSR | S_IWUSR) != 0) {
-    return fail(ExitCode::kIo, "io.write", path, std::strerror(errno), "check its owner");
+    // FAT and the like have no modes: who may mount the disk may read the key.
+    if (errno != ENOSYS && errno != EPERM && errno != EOPNOTSUPP) {
+      return fail(ExitCode::kIo, "io.write", path, std::strerror(errno), "check its owner");
+    }
+    warn_of_readers(path);
   }
   return written;
 }
@@ -150,18 +154,18 @@ Result<RootSet> read_root_keys(const std::vector<std::string>& files, unsigned t
   return make_root_set(std::move(keys), threshold);
 }
 
-/// Writes what is to be signed, and the first signature.
+/// Writes the document to sign, and the first signature.
 Result<std::string> write_draft(const RootCommand& command) {
   MODAR_ASSIGN(const auto key, load_key(command.key_file, command.pass_phrase_file));
   MODAR_ASSIGN(const auto folder, ReleaseFolder::open(command.folder));
   RootDraft draft;
   if (!command.roots.empty()) {
     MODAR_ASSIGN(const auto roots, read_root_keys(command.roots, command.threshold));
-    draft = draft_root_link(folder, roots);
+    draft = draft_root_rotation(folder, roots);
   } else {
     MODAR_ASSIGN(const auto text, read_text(command.next_key));
     MODAR_ASSIGN(const auto next, parse_public_key(text));
-    MODAR_ASSIGN(draft, draft_root_word(folder, next));
+    MODAR_ASSIGN(draft, draft_root_metadata(folder, next));
   }
   MODAR_TRY(write_root_draft(command.draft, draft));
   MODAR_ASSIGN(const auto signature, sign_root_draft(command.draft, key));
@@ -176,10 +180,10 @@ int run_draft(const RootCommand& command) {
   return static_cast<int>(ExitCode::kOk);
 }
 
-/// Says that the newest release is of an earlier epoch than the root's word, which devices refuse.
-/// Answers the exit code.
+/// Says that the newest release is of an earlier epoch than the root metadata, which devices
+/// refuse. Answers the exit code.
 int note_stale_release(const ReleaseFolder& folder) {
-  const auto word = folder.root_word();
+  const auto word = folder.root_metadata();
   if (!word) return print_error(word.error());
   const auto newest = folder.newest();
   if (!newest) return print_error(newest.error());
@@ -312,7 +316,7 @@ int run_rotate(const RotateCommand& command) {
   const auto& [key, next, folder] = *change;
   if (auto fine = folder.check_signer(key.public_key); !fine) return print_error(fine.error());
   if (auto added = folder.add_key(next, key); !added) return print_error(added.error());
-  std::fprintf(stderr, "link %u of the chain: devices move to key %s\n", folder.key_links(),
+  std::fprintf(stderr, "link %u of the chain: devices move to key %s\n", folder.key_rotations(),
                to_hex(next.id).c_str());
   return static_cast<int>(ExitCode::kOk);
 }
@@ -322,7 +326,7 @@ int run_root(const RootCommand& command) {
   const auto change = open_key_change(command);
   if (!change) return print_error(change.error());
   const auto& [key, next, folder] = *change;
-  const auto word = folder.add_root_word(next, key);
+  const auto word = folder.add_root_metadata(next, key);
   if (!word) return print_error(word.error());
   std::fprintf(stderr, "epoch %llu: key %s signs; publish the next release with it\n",
                static_cast<unsigned long long>(word->epoch), to_hex(next.id).c_str());

@@ -29,7 +29,7 @@ TextureFormat format_of(const TextureRecord& texture) {
   return static_cast<TextureFormat>(texture.format);
 }
 
-/// Collects what was written, and keeps names apart that clean to the same file.
+/// Collects written files, and keeps names apart that clean to the same file.
 class Extraction {
  public:
   Extraction(const BundleView& bundle, OutputFolder& folder) : bundle_(bundle), folder_(folder) {}
@@ -37,7 +37,7 @@ class Extraction {
   Result<void> textures();
   Result<void> patterns();
   Result<void> models();
-  /// Paths of what was written.
+  /// Paths of written files.
   [[nodiscard]] std::vector<std::string> paths() const;
 
  private:

@@ -1,4 +1,4 @@
-// Models as they stand on their pattern, in a room without it: for the viewers that phones have.
+// Models placed as on their pattern, in a room without it: for the viewers that phones have.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace modar {
 
-/// What stands on a pattern, in metres: y up, the pattern's middle at the origin, its plane the
+/// The models of a pattern, in metres: y up, the pattern's middle at the origin, its plane the
 /// ground. A pattern whose printed width is unknown has a largest side of 20 cm.
 std::vector<RoomModel> models_in_room(const BundleView& bundle, std::uint32_t pattern);
 

@@ -1,4 +1,4 @@
-// Writes the description by hand: a subset of USD that needs none of its libraries.
+// Writes the description itself: a subset of USD that needs none of its libraries.
 #include "bake/export/model_file.hpp"
 
 #include <zlib.h>

@@ -12,7 +12,7 @@
 
 namespace modar {
 
-/// What a camera wrote beside a picture's pixels.
+/// Metadata that a camera wrote into a picture's file.
 struct ExifFacts {
   /// Which corner of the picture the first pixel is: 1-8 as EXIF and TIFF count, 1: upright.
   unsigned orientation = 1;
@@ -36,10 +36,11 @@ inline tl::unexpected<Error> damaged_image(const std::string& name, std::string 
 
 /// Called with the size that a header states, before anything of that size is allocated.
 /// Errors: "image.too-large", "image.decode" where a side is 0.
-Result<void> check_image_size(std::uint64_t width, std::uint64_t height, const std::string& name);
+Result<void> check_image_size(std::uint64_t width, std::uint64_t height, std::size_t file_bytes,
+                              const std::string& name);
 
 /// Of an EXIF block (a TIFF header, its first directory and that of the exposure); an "Exif\0\0"
-/// before it is skipped. What is damaged counts as not stated.
+/// before it is skipped. Damaged fields count as not stated.
 ExifFacts exif_facts(std::span<const std::byte> exif);
 
 /// Gives an image its pixels, uninitialised where a format's library fills all of them.

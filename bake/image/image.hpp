@@ -21,8 +21,13 @@ struct RgbaImage {
 /// Whether the alpha of every pixel is 255.
 bool is_opaque(const RgbaImage& image);
 
-/// Larger images are refused: each side, in pixels. Both at the limit make 1 GiB of RGBA.
+/// Larger images are refused before they are decoded. Pixels a side.
 inline constexpr std::uint32_t kMaxImageSide = 16384;
+/// Pixels that a file of any size may have: 256 MiB of RGBA.
+inline constexpr std::uint64_t kMaxImagePixels = std::uint64_t{1} << 26;
+/// Pixels per byte of a file at most. Lower refuses large plain textures; higher lets small files
+/// take 1 GiB.
+inline constexpr std::uint64_t kMaxPixelsPerByte = 64;
 
 /// Reads PNG (libpng), JPEG (libjpeg-turbo), WebP (libwebp), TIFF (libtiff), BMP and TGA
 /// (stb_image) as upright 8-bit RGBA: EXIF orientation is applied; gray, palette, CMYK and 16-bit
@@ -60,6 +65,12 @@ double png_width_mm(const std::string& path);
 /// A progressive JPEG file without the alpha. quality: 1 to 100, as libjpeg counts. Errors:
 /// kInternal "image.encode" where the image is empty or has a side above 65500 pixels.
 Result<std::vector<std::byte>> encode_jpeg(const RgbaImage& image, int quality);
+
+/// A small WebP file of the picture, for people: of the proportions of width x height, at most 512
+/// pixels a side, and smaller where it would have more than 15 KB. Transparent pixels show white
+/// paper. Errors: kInternal "image.encode".
+Result<std::vector<std::byte>> encode_preview(const RgbaImage& image, std::uint32_t width,
+                                              std::uint32_t height);
 
 /// Levels from the image itself down to 1x1, each side max(1, floor(side / 2)), filtered in linear
 /// light (sRGB-correct), colours weighted by alpha. repeat: the filter reaches across the edges, as

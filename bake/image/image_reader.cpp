@@ -1,4 +1,4 @@
-// Which library decodes an image file, and what is done with its pixels afterwards.
+// Which library decodes an image file, and the processing of its pixels afterwards.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -33,25 +33,37 @@ struct ForeignFormat {
 };
 constexpr const char* kHeifConversion =
     "heif-convert IN OUT.jpg (Debian's libheif-examples), or let the phone's camera save JPEG";
-constexpr const char* kSvgConversion =
-    "rsvg-convert -w 2000 IN.svg -o OUT.png (Debian's librsvg2-bin)";
+constexpr const char* kSvgConversion = "rsvg-convert -w 2000 IN -o OUT.png (Debian's librsvg2-bin)";
 constexpr ForeignFormat kForeignFormats[] = {
     {"\xABKTX 20\xBB\r\n\x1A\n"sv, 0, "image.ktx", "KTX 2",
-     "ktx extract IN.ktx2 OUT.png (Khronos' KTX-Software); those in a glTF file: npx "
+     "ktx extract IN OUT.png (Khronos' KTX-Software); those in a glTF file: npx "
      "@gltf-transform/cli ktxdecompress IN.glb OUT.glb"},
     {"ftypheic", 4, "image.format", "HEIC", kHeifConversion},
     {"ftypheix", 4, "image.format", "HEIC", kHeifConversion},
     {"ftypmif1", 4, "image.format", "HEIF", kHeifConversion},
     {"ftypavif", 4, "image.format", "AVIF", kHeifConversion},
-    {"GIF8", 0, "image.format", "GIF", "ffmpeg -i IN.gif -frames:v 1 OUT.png"},
+    {"GIF8", 0, "image.format", "GIF", "ffmpeg -i IN -frames:v 1 OUT.png"},
     {"%PDF-", 0, "image.format", "PDF",
-     "pdftoppm -singlefile -r 200 -png IN.pdf OUT (Debian's poppler-utils)"},
+     "pdftoppm -singlefile -r 200 -png IN OUT (Debian's poppler-utils)"},
     {"<svg", 0, "image.format", "SVG", kSvgConversion},
     {"<?xml", 0, "image.format", "SVG", kSvgConversion},
-    {"8BPS", 0, "image.format", "Photoshop", "ffmpeg -i IN.psd OUT.png"},
+    {"DDS ", 0, "image.format", "DDS", "convert IN OUT.png (Debian's imagemagick)"},
+    {"8BPS", 0, "image.format", "Photoshop", "ffmpeg -i IN OUT.png"},
 };
 
+/// A command for a file, for which IN and OUT are placeholders.
+std::string with_names(std::string command, const std::string& name) {
+  const std::string stem = std::filesystem::path(name).replace_extension().string();
+  for (const auto& [word, by] : {std::pair<std::string, std::string>("IN", name), {"OUT", stem}}) {
+    const std::size_t at = command.find(" " + word);
+    if (at != std::string::npos) command.replace(at + 1, word.size(), shell_quoted(by));
+  }
+  return command;
+}
+
 Result<StoredImage> decode_stored(std::span<const std::byte> bytes, const std::string& name) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  MODAR_TRY(require_kind(FileKind::kPicture, text, name));
   if (starts_with(bytes, "\x89PNG\r\n\x1A\n"sv)) return decode_png(bytes, name);
   if (starts_with(bytes, "\xFF\xD8\xFF"sv)) return decode_jpeg(bytes, name);
   if (starts_with(bytes, "RIFF") && starts_with(bytes, "WEBP", 8)) return decode_webp(bytes, name);
@@ -62,7 +74,7 @@ Result<StoredImage> decode_stored(std::span<const std::byte> bytes, const std::s
     if (!starts_with(bytes, format.start, format.at)) continue;
     return fail(ExitCode::kUnsupported, format.code, name,
                 std::string(format.name) + " files are not read",
-                "convert it: " + std::string(format.conversion));
+                "convert it: " + with_names(format.conversion, name));
   }
   return decode_stb(bytes, name);
 }
@@ -158,12 +170,15 @@ bool ends_as(const std::string& path, std::initializer_list<std::string_view> en
 
 }  // namespace
 
-Result<void> check_image_size(std::uint64_t width, std::uint64_t height, const std::string& name) {
-  if (width > kMaxImageSide || height > kMaxImageSide) {
+Result<void> check_image_size(std::uint64_t width, std::uint64_t height, std::size_t file_bytes,
+                              const std::string& name) {
+  const std::uint64_t most = std::max(kMaxImagePixels, kMaxPixelsPerByte * file_bytes);
+  if (width > kMaxImageSide || height > kMaxImageSide || width * height > most) {
     return fail(
         ExitCode::kInvalidInput, "image.too-large", name,
         "its header states " + std::to_string(width) + "x" + std::to_string(height) + " pixels",
-        "scale it to at most " + std::to_string(kMaxImageSide) + " pixels a side");
+        "scale it to at most " + std::to_string(kMaxImageSide) + " pixels a side and " +
+            std::to_string(kMaxImagePixels) + " in all, such as 8192x8192");
   }
   if (width == 0 || height == 0) return damaged_image(name, "its header states no size");
   return {};

@@ -21,6 +21,7 @@ struct ErrorManager {
   jpeg_error_mgr manager;
   std::jmp_buf escape;
   std::array<char, JMSG_LENGTH_MAX> message;
+  bool ended = false;  // before its end marker
 };
 
 ErrorManager& manager_of(j_common_ptr info) {
@@ -29,8 +30,7 @@ ErrorManager& manager_of(j_common_ptr info) {
 
 /// Warnings that mean lost or invented pixels; the others are stray bytes between markers.
 bool spoils_pixels(int code) {
-  return code == JWRN_HIT_MARKER || code == JWRN_HUFF_BAD_CODE || code == JWRN_JPEG_EOF ||
-         code == JWRN_MUST_RESYNC;
+  return code == JWRN_HIT_MARKER || code == JWRN_HUFF_BAD_CODE || code == JWRN_MUST_RESYNC;
 }
 
 [[noreturn]] void give_up(j_common_ptr info) {
@@ -40,6 +40,7 @@ bool spoils_pixels(int code) {
 }
 
 void on_message(j_common_ptr info, int level) {
+  if (level < 0 && info->err->msg_code == JWRN_JPEG_EOF) manager_of(info).ended = true;
   if (level < 0 && spoils_pixels(info->err->msg_code)) give_up(info);
 }
 
@@ -77,8 +78,12 @@ class JpegReader {
       JSAMPROW row = pixels + std::size_t{info_.output_scanline} * info_.output_width * 4;
       jpeg_read_scanlines(&info_, &row, 1);
     }
+    const bool all_scans = has_all_scans();  // what it looks at is freed by the next call
     jpeg_finish_decompress(&info_);
-    return true;
+    if (!errors_.ended || all_scans) return true;
+    constexpr char kCut[] = "it ends before its last scan";
+    std::memcpy(errors_.message.data(), kCut, sizeof kCut);
+    return false;
   }
   /// YCCK counts as CMYK, which libjpeg makes of it.
   [[nodiscard]] bool is_cmyk() const { return info_.num_components == 4; }
@@ -97,6 +102,18 @@ class JpegReader {
   }
 
  private:
+  /// Whether nothing but the end marker can be missing: where the data of a scan end early, libjpeg
+  /// warns of that, but not where a whole scan is missing.
+  [[nodiscard]] bool has_all_scans() const {
+    if (info_.coef_bits == nullptr) return info_.comps_in_scan == info_.num_components;
+    for (int c = 0; c < info_.num_components; ++c) {
+      for (const int missing_bits : info_.coef_bits[c]) {
+        if (missing_bits != 0) return false;
+      }
+    }
+    return true;
+  }
+
   std::span<const std::byte> bytes_;
   ErrorManager errors_{};
   jpeg_decompress_struct info_{};
@@ -171,7 +188,7 @@ Result<StoredImage> decode_jpeg(std::span<const std::byte> bytes, const std::str
     return damaged_image(name, "the JPEG data is damaged (" + reader.error() + ")");
   };
   if (!reader.read_header()) return damaged();
-  MODAR_TRY(check_image_size(reader.width(), reader.height(), name));
+  MODAR_TRY(check_image_size(reader.width(), reader.height(), bytes.size(), name));
   StoredImage stored;
   stored.exif = reader.exif();
   allocate_pixels(stored.image, reader.width(), reader.height());

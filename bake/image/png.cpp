@@ -166,7 +166,7 @@ Result<StoredImage> decode_png(std::span<const std::byte> bytes, const std::stri
     return damaged_image(name, "the PNG data is damaged (" + reader.error() + ")");
   };
   if (!reader.read_header()) return damaged();
-  MODAR_TRY(check_image_size(reader.width(), reader.height(), name));
+  MODAR_TRY(check_image_size(reader.width(), reader.height(), bytes.size(), name));
   StoredImage stored;
   allocate_pixels(stored.image, reader.width(), reader.height());
   std::vector<png_bytep> rows(stored.image.height);

@@ -194,9 +194,8 @@ RgbaImage to_srgb(const LinearImage& image) {
 
 RgbaImage resize(const RgbaImage& image, std::uint32_t width, std::uint32_t height,
                  const ResampleOptions& options) {
-  /// Rows of the result in a band. More convert fewer source rows twice, at bands' borders, and
-  /// take more memory: of 16, a fifth is converted twice, and rows of a quarter of 8192 columns
-  /// take 10 MB a thread.
+  /// Rows of the result in a band. More convert fewer source rows twice, at bands' borders; fewer
+  /// take less memory.
   constexpr std::uint32_t kBand = 16;
   const bool opaque = is_opaque(image);
   const std::vector<Taps> rows = plan(image.height, height, opaque, options.repeat);

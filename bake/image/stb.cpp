@@ -105,7 +105,7 @@ Result<LinearImage> decode_radiance(std::span<const std::byte> bytes, const std:
   }
   const auto columns = static_cast<std::uint64_t>(std::max(width, 0));
   const auto rows = static_cast<std::uint64_t>(std::max(height, 0));
-  MODAR_TRY(check_image_size(columns, rows, name));
+  MODAR_TRY(check_image_size(columns, rows, bytes.size(), name));
   const auto truncated = [&] { return damaged_image(name, "the file ends before its image does"); };
   if (columns * rows > bytes.size() * kLongestRun) return truncated();  // before it is allocated
   const bool with_runs = columns >= 8 && columns < 32768;
@@ -137,7 +137,7 @@ Result<StoredImage> decode_stb(std::span<const std::byte> bytes, const std::stri
   }
   const auto columns = static_cast<std::uint64_t>(std::abs(std::int64_t{width}));
   const auto rows = static_cast<std::uint64_t>(std::abs(std::int64_t{height}));
-  MODAR_TRY(check_image_size(columns, rows, name));
+  MODAR_TRY(check_image_size(columns, rows, bytes.size(), name));
   const bool bmp = bytes[0] == std::byte{'B'} && bytes[1] == std::byte{'M'};
   const TgaQuirks quirks = bmp ? TgaQuirks{} : tga_quirks(bytes);
   if (quirks.shifted_map) {

@@ -64,7 +64,7 @@ TiffFile open_tiff(TiffState& state, const std::string& name) {
 }
 
 /// The orientation of the file, which is set to "upright" for libtiff, that only mirrors; and alpha
-/// that is not multiplied in declared as if it were, so that libtiff leaves colours as they are.
+/// that is not multiplied in declared as if it were, so that libtiff leaves colours unchanged.
 std::uint16_t leave_pixels_as_stored(TIFF* file) {
   std::uint16_t orientation = ORIENTATION_TOPLEFT;
   TIFFGetFieldDefaulted(file, TIFFTAG_ORIENTATION, &orientation);
@@ -95,13 +95,13 @@ Result<StoredImage> decode_tiff(std::span<const std::byte> bytes, const std::str
       TIFFGetField(file.get(), TIFFTAG_IMAGELENGTH, &height) == 0) {
     return damaged();
   }
-  MODAR_TRY(check_image_size(width, height, name));
+  MODAR_TRY(check_image_size(width, height, bytes.size(), name));
   StoredImage stored;
   stored.exif.orientation = leave_pixels_as_stored(file.get());
   std::vector<std::uint32_t> raster(std::size_t{width} * height);
   const bool read = TIFFReadRGBAImageOriented(file.get(), width, height, raster.data(),
                                               ORIENTATION_TOPLEFT, 1) != 0;
-  // libtiff goes on after some kinds of damage, and so does not say it in its result.
+  // libtiff continues after some kinds of damage without reporting it in its result.
   if (!read || !state.error.empty()) return damaged();
   allocate_pixels(stored.image, width, height);
   std::uint8_t* out = stored.image.pixels.data();

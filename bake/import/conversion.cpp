@@ -3,18 +3,13 @@
 
 #include <filesystem>
 
+#include "bake/io/input.hpp"
+
 namespace modar {
 namespace {
 
-/// A word that a shell takes as it is.
-std::string quoted(const std::string& path) {
-  std::string text = "'";
-  for (const char c : path) text += c == '\'' ? "'\\''" : std::string(1, c);
-  return text + "'";
-}
-
 std::string with_ending(const std::string& path, const char* ending) {
-  return quoted(std::filesystem::path(path).replace_extension(ending).string());
+  return shell_quoted(std::filesystem::path(path).replace_extension(ending).string());
 }
 
 }  // namespace
@@ -23,11 +18,11 @@ std::string format_conversion(const std::string& path, const std::string& extens
   const std::string glb = with_ending(path, ".glb");
   for (const char* known : {".fbx", ".dae", ".3ds", ".lwo", ".x", ".ac", ".ms3d", ".b3d", ".3mf"}) {
     if (extension != known) continue;
-    return "convert it: assimp export " + quoted(path) + " " + glb +
+    return "convert it: assimp export " + shell_quoted(path) + " " + glb +
            " (Debian's assimp-utils), or export glTF from the program that made it";
   }
   if (extension == ".blend") {
-    return "convert it: blender -b " + quoted(path) +
+    return "convert it: blender -b " + shell_quoted(path) +
            " --python-expr \"import bpy; bpy.ops.export_scene.gltf(filepath=" + glb + ")\"";
   }
   return "convert it to glTF 2.0 (.glb, .gltf), Wavefront OBJ, PLY or STL";
@@ -35,7 +30,7 @@ std::string format_conversion(const std::string& path, const std::string& extens
 
 std::string gltf_conversion(const std::string& path, GltfCompression compression) {
   std::string command = "convert it: ";
-  std::string from = quoted(path);
+  std::string from = shell_quoted(path);
   if (compression.meshes) {
     const std::string unpacked = with_ending(path, ".unpacked.glb");
     command += "npx gltfpack -noq -km -i " + from + " -o " + unpacked;

@@ -1,4 +1,4 @@
-// The commands that convert what is not read, as cures of errors. Internal to bake/import.
+// The commands that convert unsupported files, as cures of errors. Internal to bake/import.
 #pragma once
 
 #include <string>

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "bake/import/conversion.hpp"
+#include "bake/io/input.hpp"
 
 namespace modar {
 namespace {
@@ -32,7 +33,7 @@ Result<SourceModel> read_format(const std::string& path, const ReadOptions& opti
     case Format::kObj:
       return read_obj(path, options);
     case Format::kGltf:
-      return read_gltf(path);
+      return read_gltf(path, options);
     case Format::kPly:
       return read_ply(path, options);
     case Format::kStl:
@@ -40,17 +41,35 @@ Result<SourceModel> read_format(const std::string& path, const ReadOptions& opti
     case Format::kNone:
       break;
   }
-  MODAR_TRY(require_model_format(path));
   return fail(ExitCode::kInternal, "modar.bug", path, "a format without a reader", "report it");
 }
 
 }  // namespace
+
+bool ModelFolder::has(const std::string& file) const {
+  return is_regular_file(file) && (within.empty() || is_inside(within, file));
+}
+
+Diagnostic not_read(const char* id, const std::string& label, std::uint64_t line,
+                    const std::string& what, const std::string& name, const ModelFolder& folder,
+                    const char* missing) {
+  const bool outside =
+      !folder.within.empty() && !find_named_file(name, ModelFolder(folder.path)).empty();
+  return {
+      id,
+      DiagnosticSeverity::kWarning,
+      label,
+      line,
+      what + (outside ? " is outside the project's folder and is left out" : " was not found"),
+      outside ? "copy it into the folder; if you trust the project, bake with --outside" : missing};
+}
 
 bool is_model_file(const std::string& path) {
   return format_of(extension_of(path)) != Format::kNone;
 }
 
 Result<void> require_model_format(const std::string& path) {
+  if (is_regular_file(path)) MODAR_TRY(require_kind(FileKind::kModel, path));
   if (is_model_file(path)) return {};
   const std::string extension = extension_of(path);
   return fail(ExitCode::kUnsupported, "model.format", path,
@@ -60,9 +79,10 @@ Result<void> require_model_format(const std::string& path) {
 }
 
 Result<SourceModel> read_model(const std::string& path, const ReadOptions& options) {
+  MODAR_TRY(require_model_format(path));
   MODAR_ASSIGN(SourceModel model, read_format(path, options));
   for (SourceMaterial& m : model.materials) {
-    // Clay is for what has no colour: those of vertices are seen as they are.
+    // Clay is for what has no colour: those of vertices are seen unchanged.
     const bool clay = m.diffuse_map.empty() && m.diffuse == glm::vec3(kClay);
     if (clay && !model.colours.empty()) m.diffuse = glm::vec3(1.0f);
   }

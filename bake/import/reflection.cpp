@@ -1,4 +1,4 @@
-// From roughness and metalness to a highlight and what is mirrored.
+// From roughness and metalness to a highlight and the reflection.
 #include "bake/import/reflection.hpp"
 
 #include <algorithm>
@@ -9,12 +9,12 @@
 namespace modar {
 namespace {
 
-/// Of white: the middle of a highlight brightens a gray of 50 % by 13 of 255 then. Duller ones are
-/// hardly seen, and cost a phone as much as bright ones.
+/// Reflection of white below which highlights are invisible. Higher drops visible highlights, lower
+/// costs phones time.
 constexpr double kFaint = 0.05;
 /// Luminance below which a surface is seen by what it mirrors: less than dielectrics reflect.
 constexpr double kDark = kDielectricReflectance;
-/// Less metal takes less than a tenth of the colour away, 4 % as it is stored.
+/// Less metal takes less than a tenth of the colour away, 4 % of its stored value.
 constexpr double kSomeMetal = 0.1;
 
 }  // namespace

@@ -16,8 +16,8 @@
 
 namespace modar {
 
-/// Stored red, green and blue of what states no colour: in the renderer's own room, the part that
-/// faces the key light is just not clipped. No file states it to the last bit.
+/// Stored colour of surfaces without one. In the neutral room its brightest part is just not
+/// clipped.
 inline constexpr float kClay = 229.0f / 255.0f;
 
 /// A picture of the directions in which a surface looks, about its own: red to rising u, green to
@@ -29,6 +29,14 @@ struct NormalMap {
   glm::dmat3 uv{1.0};           ///< from the base colour's uv, v down, to the map's
 
   bool operator==(const NormalMap&) const = default;
+};
+
+/// Where a picture is on a surface, as an MTL's -s and -o say: uv * scale + offset, v up.
+struct MapPlace {
+  glm::dvec2 scale{1.0};
+  glm::dvec2 offset{0.0};
+
+  bool operator==(const MapPlace&) const = default;
 };
 
 /// A material of an MTL or glTF file. Map paths are resolved against the file that names them and
@@ -45,10 +53,11 @@ struct SourceMaterial {
   float opacity = 1.0f;
   std::string diffuse_map;
   std::string alpha_map;
+  MapPlace place;  ///< of the diffuse map; readers apply it to the uvs
   NormalMap normal;
   bool two_sided = false;
   bool see_through = false;  ///< its picture has alpha; unknown (false) until it has been read
-  /// Named "occluder": stands for a real thing, hides what is behind it and is not seen itself.
+  /// Named "occluder": represents a real object, hides content behind it and is invisible itself.
   [[nodiscard]] bool occluder() const { return name == "occluder"; }
   std::shared_ptr<const void> keeper;  ///< owner of temporary files that hold the maps, or null
 };
@@ -88,7 +97,7 @@ struct FaceRun {
 /// face 0.
 struct SourceModel {
   std::string name;  ///< the file's stem
-  Upright up;        ///< as the format or a comment says it, else what is usual for the format
+  Upright up;        ///< as the format or a comment says it, else the usual one of the format
   Array<glm::dvec3> positions;
   Array<glm::vec3> colours;  ///< empty, or one a position, RGB in [0,1]
   Array<glm::dvec2> uvs;     ///< v up, as OBJ has it
@@ -101,7 +110,8 @@ struct SourceModel {
   std::vector<FaceRun> smoothing_runs;
   std::vector<SourceMaterial> materials;
   std::vector<Diagnostic> diagnostics;
-  /// Other files that the model's own one names, those that are missing too; maps stand in the
+  std::uint64_t lost_faces = 0;  ///< that the file states and the reader could not use
+  /// Other files that the model's own one names, those that are missing too; maps are in the
   /// materials, and here where they are missing.
   std::vector<std::string> files;
 

@@ -34,14 +34,14 @@ bool has_sides_of_textures(const std::string& picture) {
 }
 
 /// The first in byte order, so that the result does not depend on the file system's; empty: none.
-fs::path texture_beside(const std::string& model, const fs::path& folder, bool own_picture) {
+fs::path texture_beside(const std::string& model, const ModelFolder& folder, bool own_picture) {
   std::set<fs::path> named;
   std::set<fs::path> own;
   std::error_code error;
-  fs::directory_iterator it(folder, error);
+  fs::directory_iterator it(folder.path, error);
   for (; !error && it != fs::directory_iterator(); it.increment(error)) {
     const fs::path& path = it->path();
-    if (!is_picture_file(path.string())) continue;
+    if (!is_picture_file(path.string()) || !folder.has(path.string())) continue;
     if (is_texture_name(path.stem().string(), model)) named.insert(path);
     if (own_picture && is_own_picture(path.stem().string(), model)) own.insert(path);
   }
@@ -86,13 +86,13 @@ bool is_own_picture(std::string_view picture, std::string_view model) {
   return ascii_lower(std::string(picture)) == ascii_lower(std::string(model));
 }
 
-void take_texture_by_name(const std::string& folder, const std::string& label, bool own_picture,
-                          SourceModel& model) {
-  if (folder.empty() || model.uvs.empty() || !model.colours.empty()) return;
+void assign_texture_by_name(const ModelFolder& folder, const std::string& label, bool own_picture,
+                            SourceModel& model) {
+  if (folder.path.empty() || model.uvs.empty() || !model.colours.empty()) return;
   const fs::path texture = texture_beside(model.name, folder, own_picture);
   if (texture.empty()) {
     const std::string name = model.name + "_texture.png";
-    model.files.push_back((fs::path(folder) / name).string());
+    model.files.push_back((fs::path(folder.path) / name).string());
     model.diagnostics.push_back({"model.no-texture", DiagnosticSeverity::kInfo, label, 0,
                                  "has texture coordinates, but no texture",
                                  "if it should have one, call the picture '" + name + "'"});

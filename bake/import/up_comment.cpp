@@ -13,8 +13,8 @@ bool is_word(char c) {
   return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
 }
 
-/// Words of a comment in lower case. A sign stays with the word that it stands before where a blank
-/// or the like stands before the sign: "-z", but "z-up" is two words.
+/// Words of a comment in lower case. A sign stays with the word after it if a blank or the like is
+/// before the sign: "-z", but "z-up" is two words.
 std::vector<std::string> words_of(std::string_view line) {
   std::vector<std::string> words;
   std::string word;

@@ -1,17 +1,112 @@
 // A whole file, as far as its reader allows.
 #include "bake/io/input.hpp"
 
+#include <algorithm>
 #include <cstdio>
+#include <fstream>
 #include <memory>
 
+#include "formats/base/path.hpp"
+#include "formats/base/utf8.hpp"
+
 namespace modar {
+namespace {
+
+using std::string_view_literals::operator""sv;
+
+struct Signature {
+  std::string_view bytes;
+  std::size_t at;  ///< byte of the file
+  FileKind kind;
+  const char* name;
+};
+constexpr Signature kSignatures[] = {{"\x89PNG\r\n"sv, 0, FileKind::kPicture, "PNG"},
+                                     {"\xFF\xD8\xFF"sv, 0, FileKind::kPicture, "JPEG"},
+                                     {"WEBP"sv, 8, FileKind::kPicture, "WebP"},
+                                     {"II*\0"sv, 0, FileKind::kPicture, "TIFF"},
+                                     {"MM\0*"sv, 0, FileKind::kPicture, "TIFF"},
+                                     {"GIF8"sv, 0, FileKind::kPicture, "GIF"},
+                                     {"ftyphei"sv, 4, FileKind::kPicture, "HEIC"},
+                                     {"ftypmif1"sv, 4, FileKind::kPicture, "HEIF"},
+                                     {"ftypavif"sv, 4, FileKind::kPicture, "AVIF"},
+                                     {"glTF"sv, 0, FileKind::kModel, "glTF"},
+                                     {"ply\n"sv, 0, FileKind::kModel, "PLY"},
+                                     {"ply\r"sv, 0, FileKind::kModel, "PLY"},
+                                     {"solid "sv, 0, FileKind::kModel, "STL"}};
+
+/// An STL or OBJ file need not begin with words of its own. The size of a binary STL follows from
+/// its number of triangles; of the others the name says what they are.
+const char* unsigned_model(std::string_view bytes, const std::string& path) {
+  constexpr std::size_t kStlHeader = 84;
+  constexpr std::size_t kStlTriangle = 50;
+  if (bytes.size() >= kStlHeader && (bytes.size() - kStlHeader) % kStlTriangle == 0) {
+    std::size_t count = 0;
+    for (std::size_t i = kStlHeader; i-- > kStlHeader - 4;) {
+      count = count << 8 | static_cast<unsigned char>(bytes[i]);
+    }
+    if (count == (bytes.size() - kStlHeader) / kStlTriangle) return "STL";
+  }
+  const std::string ending = ascii_lower(std::filesystem::path(path).extension().string());
+  return ending == ".stl" ? "STL" : ending == ".obj" ? "OBJ" : ending == ".gltf" ? "glTF" : nullptr;
+}
+
+}  // namespace
+
+Result<void> require_kind(FileKind wanted, std::string_view start, const std::string& path) {
+  if (start.empty()) {
+    return fail(ExitCode::kInvalidInput, "io.empty", path, "the file is empty",
+                "make it again, or copy it again");
+  }
+  const auto* found = std::ranges::find_if(kSignatures, [&](const Signature& one) {
+    return start.size() > one.at && start.substr(one.at).starts_with(one.bytes);
+  });
+  const bool known = found != std::end(kSignatures);
+  if (wanted == FileKind::kModel) {
+    if (!known || found->kind == wanted) return {};
+    return fail(ExitCode::kUsage, "model.picture", path,
+                std::string("this is a picture (") + found->name + "), not a model",
+                "pass it as a pattern, with the ending of a picture; models are glTF, OBJ, PLY and "
+                "STL files");
+  }
+  const char* model =
+      known ? (found->kind == wanted ? nullptr : found->name) : unsigned_model(start, path);
+  if (model == nullptr) return {};
+  return fail(ExitCode::kUsage, "image.model", path,
+              std::string("this is a model (") + model + "), not a picture",
+              "pass it as a model, with the ending of one; patterns are PNG, JPEG, WebP, TIFF, BMP "
+              "and TGA files");
+}
+
+Result<void> require_kind(FileKind wanted, const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string start(16, '\0');
+  file.read(start.data(), static_cast<std::streamsize>(start.size()));
+  start.resize(static_cast<std::size_t>(file.gcount()));
+  return require_kind(wanted, start, path);
+}
+
+std::string shell_quoted(const std::string& word) {
+  std::string out = "'";
+  for (const char c : word) out += c == '\'' ? "'\\''" : std::string(1, c);
+  return out + "'";
+}
+
+bool is_inside(const std::string& folder, const std::filesystem::path& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path root = fs::canonical(folder.empty() ? "." : folder, error);
+  if (error) return false;
+  const fs::path whole = fs::weakly_canonical(fs::absolute(path, error), error);
+  const fs::path below = whole.lexically_relative(root);
+  return !error && !below.empty() && *below.begin() != "..";
+}
 
 Result<std::string> read_file(const std::string& path, std::size_t most) {
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(
       is_regular_file(path) ? std::fopen(path.c_str(), "rb") : nullptr, &std::fclose);
   const auto unreadable = [&path] {
-    return fail(ExitCode::kIo, "io.open", path, "the file cannot be opened or read",
-                "check its name and permissions");
+    return missing_file(path, {ExitCode::kIo, "io.open", path, "the file cannot be opened or read",
+                               "check its name and permissions"});
   };
   if (std::error_code error; !file && std::filesystem::is_directory(path, error)) {
     return fail(ExitCode::kIo, "io.open", path, "it is a folder", "name a file in it");

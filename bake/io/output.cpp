@@ -1,9 +1,11 @@
 #include "bake/io/output.hpp"
 
+#include <signal.h>
 #include <stdlib.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -12,7 +14,9 @@
 
 #include "bake/io/input.hpp"
 #include "bake/io/terminal.hpp"
+#include "bake/json.hpp"
 #include "formats/base/atomic_file.hpp"
+#include "formats/trim.hpp"
 
 namespace modar {
 namespace {
@@ -20,6 +24,23 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFolderMark = ".modar-output";
+constexpr std::string_view kStaging = ".modar-";  ///< and the number of the process
+
+/// Removes what runs that were killed have left of their files.
+void remove_left_staging(const std::string& folder) {
+  std::error_code ignored;
+  std::vector<fs::path> left;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(kStaging) || !entry.is_directory(ignored)) continue;
+    const char* const end = name.data() + name.size();
+    ::pid_t process = 0;
+    const auto read = std::from_chars(name.data() + kStaging.size(), end, process);
+    const bool ours = read.ec == std::errc() && read.ptr == end && process > 0;
+    if (ours && ::kill(process, 0) != 0 && errno == ESRCH) left.push_back(entry.path());
+  }
+  for (const fs::path& path : left) fs::remove_all(path, ignored);
+}
 
 }  // namespace
 
@@ -35,23 +56,27 @@ Result<void> make_output_folder(const std::string& folder) {
 
 OutputFolder::OutputFolder(std::string folder, bool made)
     : folder_(std::move(folder)),
-      staging_(path(".modar-" + std::to_string(::getpid()))),
+      staging_(path(std::string(kStaging) + std::to_string(::getpid()))),
       made_(made) {}
 
 OutputFolder::OutputFolder(OutputFolder&& other) noexcept
     : folder_(std::move(other.folder_)),
       staging_(std::exchange(other.staging_, std::string())),
       made_(other.made_),
+      marked_(other.marked_),
       names_(std::move(other.names_)) {}
 
 OutputFolder::~OutputFolder() {
   std::error_code ignored;
-  if (!staging_.empty()) fs::remove_all(staging_, ignored);
-  if (!staging_.empty() && made_) fs::remove(folder_, ignored);
+  if (staging_.empty()) return;
+  fs::remove_all(staging_, ignored);
+  if (marked_) fs::remove(path(kFolderMark), ignored);
+  if (made_) fs::remove(folder_, ignored);
 }
 
 Result<OutputFolder> OutputFolder::claim(const std::string& folder, bool force) {
   std::error_code error;
+  remove_left_staging(folder);
   const bool there = fs::exists(folder, error);
   const bool empty = !there || fs::is_empty(folder, error);
   if (!error && !empty && !force && !fs::exists(fs::path(folder) / kFolderMark, error)) {
@@ -62,7 +87,14 @@ Result<OutputFolder> OutputFolder::claim(const std::string& folder, bool force) 
   MODAR_TRY(make_output_folder(folder));
   OutputFolder output(folder, !there);
   constexpr std::string_view kMark = "Files of this folder were written by modar.\n";
-  MODAR_TRY(output.write(kFolderMark, std::as_bytes(std::span(kMark))));
+  const auto mark = std::as_bytes(std::span(kMark));
+  // At once where nothing else is there: a run that is killed leaves a folder that the next takes.
+  if (!empty) {
+    MODAR_TRY(output.write(kFolderMark, mark));
+    return output;
+  }
+  MODAR_TRY(write_file(output.path(kFolderMark), mark));
+  output.marked_ = true;
   return output;
 }
 
@@ -143,6 +175,15 @@ std::uint64_t file_bytes(const std::vector<std::string>& paths) {
     if (!error) sum += bytes;
   }
   return sum;
+}
+
+Result<std::vector<std::byte>> trim_to_publish(const BundleView& bundle) {
+  const Json options = Json::parse(bundle.meta()).find("options").value_or(Json());
+  const bool named = options.find("parameters").value_or(Json()).size() != 0;
+  if (named || bundle.parameter_sets().size() == 0) return std::vector<std::byte>();
+  const BundleContent content = trim(bundle);
+  if (content.parameter_sets.size() != 0) return std::vector<std::byte>();
+  return encode_bundle(content);
 }
 
 }  // namespace modar

@@ -14,6 +14,8 @@
 
 namespace modar {
 
+class BundleView;
+
 /// Makes the folder and those above it where they are missing. Errors: kIo "io.folder".
 Result<void> make_output_folder(const std::string& folder);
 
@@ -28,7 +30,7 @@ class OutputFolder {
   OutputFolder& operator=(OutputFolder&&) = delete;
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
-  /// Without commit(), what was written goes, and the folder if claim() made it.
+  /// Without commit(), written files are removed, and the folder if claim() made it.
   ~OutputFolder();
 
   /// name: a path within the folder. Errors: kIo "io.folder", "io.write".
@@ -42,6 +44,7 @@ class OutputFolder {
   std::string folder_;
   std::string staging_;  ///< a folder within it; empty: nothing is to be done any more
   bool made_ = false;
+  bool marked_ = false;  ///< claim() has written the mark into the folder
   std::vector<std::string> names_;
 };
 
@@ -50,8 +53,8 @@ class OutputFolder {
 Result<void> keep_inputs(const std::string& output, const std::vector<std::string>& inputs);
 
 /// Refuses to write over a file of another kind than the output will be. is_ours: judges the first
-/// 4 KiB of what is there; what is missing, empty or no regular file is written to.
-/// kind: "a page of modar report". Errors: kUsage "out.foreign".
+/// 4 KiB of an existing file; a missing, empty or special file is written to. kind: "a
+/// page of modar report". Errors: kUsage "out.foreign".
 Result<void> keep_other_kinds(const std::string& output, const std::string& kind,
                               const std::function<bool(std::string_view)>& is_ours);
 
@@ -61,5 +64,10 @@ Result<void> try_output(const std::string& path, std::uint64_t bytes);
 
 /// Bytes of those of the files that are there.
 std::uint64_t file_bytes(const std::vector<std::string>& paths);
+
+/// A bundle as pages, apps and releases get it: without keypoints of the ModAR paper's method (see
+/// trim()), unless its bake named `parameters`. Empty: nothing is left out. Errors: those of
+/// encode_bundle().
+Result<std::vector<std::byte>> trim_to_publish(const BundleView& bundle);
 
 }  // namespace modar

@@ -202,9 +202,11 @@ void warn_of_readers(const std::string& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return;
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) == 0) return;
-  std::fprintf(stderr,
-               "modar: warning: %s: other users can read this secret key: chmod 600 [key.mode]\n",
-               printable(path).c_str());
+  std::fprintf(
+      stderr,
+      "modar: warning: %s: other users can read this secret key: chmod 600, or move it to a "
+      "disk that has permissions [key.mode]\n",
+      printable(path).c_str());
 }
 
 ProcessCost process_cost() {

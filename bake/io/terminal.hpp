@@ -12,8 +12,8 @@
 namespace modar {
 
 /// Shows what a command is at. On a terminal one line that is overwritten; elsewhere a line a
-/// stage. A stage that has run for 5 seconds gets an estimate of what is left, from the part that
-/// is done. as_json: a line {"stage", "done"} for each percent, for programs.
+/// stage. A stage that has run for 5 seconds gets an estimate of the remaining time, from the
+/// finished part. as_json: a line {"stage", "done"} for each percent, for programs.
 class ProgressBar {
  public:
   explicit ProgressBar(bool quiet, bool as_json = false);
@@ -40,16 +40,16 @@ class ProgressBar {
   double next_words_s_ = 0;  ///< elsewhere: when the stage's next estimate is due
 };
 
-/// ", about 40 s left" from what is done after so long; empty before 5 s, and where nothing is
+/// ", about 40 s left" from the part done after this time; empty before 5 s, and where nothing is
 /// done.
 std::string time_left(double done, double elapsed_s);
 
 /// "modar: error: where: cause; cure [code]" on stderr. Answers the exit code.
 int print_error(const Error& error);
-/// What a program does between its first and last line. An exception that nobody caught is told as
-/// a bug of ours.
+/// What a program does between its first and last line. An exception that nobody caught is reported
+/// as a bug of ModAR.
 int guarded(const std::function<int()>& work);
-/// What is left of the output goes to stdout; `code`, or that of an error where it does not arrive
+/// The rest of the output goes to stdout; `code`, or that of an error where it does not arrive
 /// there (a full disk, kIo "io.stdout"). The last thing that a program does.
 int finish_output(int code);
 /// All findings of a bake on stderr, each once: notes first, warnings after them, errors last. Of

@@ -13,9 +13,8 @@
 namespace modar::detail {
 namespace {
 
-/// Blocks are aligned to it, so that the system may use huge pages. It is not asked to (madvise):
-/// in virtual machines that return free memory to their host, huge pages were measured at 2.5 s a
-/// GiB on first touch, small ones at 0.6 s; that is an eighth of a whole bake's time.
+/// Alignment that lets the system use huge pages. madvise is not called: first touch of huge pages
+/// is slower in virtual machines.
 constexpr std::size_t kHugePage = std::size_t{2} << 20;
 
 /// Pages are made resident in stretches of this size: what the last one of an array wastes at most.

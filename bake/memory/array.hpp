@@ -10,8 +10,8 @@
 
 namespace modar {
 
-/// Blocks of at least so many bytes have their own pages, which are remapped as they grow; smaller
-/// ones are the heap's.
+/// Blocks of at least this many bytes have their own pages, which are remapped as they grow;
+/// smaller ones are the heap's.
 inline constexpr std::size_t kLargeBlock = std::size_t{4} << 20;
 
 namespace detail {
@@ -82,7 +82,7 @@ class Array {
     resize(size_ + 1);
     data_[size_ - 1] = copy;
   }
-  /// values must not lie in this array.
+  /// values must not be in this array.
   void append(const T* values, std::size_t count) {
     if (count == 0) return;
     resize(size_ + count);

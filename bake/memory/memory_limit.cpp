@@ -21,10 +21,9 @@
 namespace modar {
 namespace {
 
-/// Time between two looks at the resident size; one costs some microseconds. A core touches about
-/// 1 MiB a millisecond: of a limit of 256 MiB, kHigh leaves room for 46 of these.
+/// Time between two looks at the resident size. Longer may exceed the limit before the next look.
 constexpr auto kPause = std::chrono::milliseconds(1);
-/// Share of the limit at which pages are dropped. The rest is for what is touched until the next
+/// Share of the limit at which pages are dropped. The rest is for pages touched until the next
 /// look.
 constexpr double kHigh = 0.82;
 
@@ -102,10 +101,10 @@ MemoryLimit::MemoryLimit(std::unique_ptr<Watch> watch) : watch_(std::move(watch)
 
 Result<std::unique_ptr<MemoryLimit>> MemoryLimit::start(const std::string& folder,
                                                         std::uint64_t bytes) {
-  if (bytes < kLeast) {
+  if (bytes < kMinMemoryLimit) {
     return fail(ExitCode::kUnsupported, "memory.small", "--memory",
                 "the program itself needs more than that",
-                "allow at least " + std::to_string(kLeast / 1'000'000) + "M");
+                "allow at least " + std::to_string(kMinMemoryLimit / 1'000'000) + "M");
   }
   const int trial = nameless_file(folder);
   if (trial < 0) {
@@ -168,7 +167,7 @@ void* resize_file_block(void* block, std::size_t old_size, std::size_t size) {
   if (size > old_size && !allocate(descriptor, size)) out_of_memory();
   void* const moved = ::mremap(block, old_size, size, MREMAP_MAYMOVE);
   if (moved == MAP_FAILED) out_of_memory();
-  // Best effort: what is beyond the end only takes disk space.
+  // Best effort: parts beyond the end only take disk space.
   if (size < old_size && ::ftruncate(descriptor, static_cast<off_t>(size)) != 0) errno = 0;
   heap.blocks.erase(found);
   heap.blocks[static_cast<char*>(moved)] = {size, descriptor};

@@ -13,18 +13,18 @@ namespace modar {
 /// While one exists, blocks of Array from some megabytes on are mapped from nameless files instead
 /// of memory, and a thread watches the process's resident size: near the limit, the pages of those
 /// files are unmapped from the process (the system writes them to disk when it needs the memory).
-/// Results stay the same to the bit. Only what is in arrays is limited; everything else has to fit
+/// Results stay the same to the bit. Only arrays are limited; everything else has to fit
 /// besides. At most one at a time; blocks may outlive it.
 class MemoryLimit {
  public:
   /// folder: for the files, which grow to the size of the arrays. Errors: kIo "memory.folder"
-  /// where no file can be made there; kUnsupported "memory.small" below kLeast.
+  /// where no file can be made there; kUnsupported "memory.small" below kMinMemoryLimit.
   static Result<std::unique_ptr<MemoryLimit>> start(const std::string& folder, std::uint64_t bytes);
   MemoryLimit(const MemoryLimit&) = delete;
   MemoryLimit& operator=(const MemoryLimit&) = delete;
   ~MemoryLimit();
 
-  static constexpr std::uint64_t kLeast = 64'000'000;
+  static constexpr std::uint64_t kMinMemoryLimit = 64'000'000;
 
  private:
   struct Watch;

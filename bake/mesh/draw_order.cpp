@@ -13,12 +13,12 @@
 namespace modar {
 namespace {
 
-/// Model space. What is no farther off lies in a plane: half floats move vertices by up to 2.4e-4.
+/// Model space. Points this near are in a plane: half floats move vertices by up to 2.4e-4.
 constexpr double kThickness = 3e-4;
 /// Larger sets are halved by planes of an axis, which cost no look at each pair: at kTries planes
-/// of so many triangles, a node costs 4,096 looks.
+/// of this many triangles, a node costs 4,096 comparisons.
 constexpr std::size_t kMostCompared = 512;
-/// Cuts of a material, beside an eighth of its triangles; each adds one or two triangles.
+/// Cuts of a material, in addition to an eighth of its triangles; each adds one or two triangles.
 constexpr std::size_t kFreeCuts = 256;
 /// Planes that are tried at a node.
 constexpr std::size_t kTries = 8;
@@ -54,8 +54,8 @@ bool crosses(const Plane& plane, const Corners& t) {
 
 class PlaneTree {
  public:
-  /// Cuts a triangle of the tree at a plane; answers the pieces beside the first, which takes its
-  /// place.
+  /// Cuts a triangle of the tree at a plane; answers the pieces other than the first, which takes
+  /// its place.
   using Cut = std::function<std::vector<Corners>(std::uint32_t triangle, const Plane& plane,
                                                  Corners& first)>;
 

@@ -19,11 +19,11 @@ inline constexpr std::size_t kMostOrderedTriangles = 4096;
 
 /// Cuts triangles of each such material where the plane of another goes through them, so that of
 /// any two one is behind: crossed cards. blended: a material each. Adds at most a quarter of the
-/// triangles, and 512; materials of more than kMostOrderedTriangles stay as they are.
+/// triangles, and 512; materials of more than kMostOrderedTriangles stay unchanged.
 void cut_crossing(TriMesh& mesh, const std::vector<bool>& blended);
 
-/// A node for each triangle, and some of planes alone. What still lies on both sides of a plane is
-/// where its middle is.
+/// A node for each triangle, and some of planes alone. A triangle on both sides of a plane is
+/// sorted by its centre.
 std::vector<DrawOrderRecord> draw_order(std::span<const std::array<glm::dvec3, 3>> triangles);
 
 }  // namespace modar

@@ -11,6 +11,7 @@
 #include <glm/vec4.hpp>
 
 #include "bake/import/source_model.hpp"
+#include "formats/base/error.hpp"
 
 namespace modar {
 
@@ -51,9 +52,15 @@ struct TriMesh {
   }
 };
 
-/// How far uv may leave [0,1] and still count as inside: half a texel at 4096, which is what
-/// exporters' rounding leaves at a border. Larger clamps textures that repeat by a sliver; smaller
-/// repeats (and so resizes to powers of two) textures that do not.
+/// The error of a stage that has no triangle to work on. why: what became of them.
+inline tl::unexpected<Error> no_triangle_left(const std::string& model, const char* why) {
+  return fail(ExitCode::kInvalidInput, "model.empty", model,
+              std::string("no triangle is left: ") + why,
+              "check the model in a viewer and export it again");
+}
+
+/// Distance of uv outside [0,1] that counts as inside. Larger clamps textures that repeat by a
+/// sliver; smaller repeats those with rounding errors.
 inline constexpr double kUvSlack = 1e-4;
 
 /// For each material, whether any of its triangles samples outside of [0,1].

@@ -17,8 +17,8 @@ namespace {
 constexpr double kFarSides = 100.0;
 /// ... and the height at most this share of the nearer one of the other two.
 constexpr double kHeightShare = 0.02;
-/// Of the area, what an open ground shows from above after what it shows from below is taken off.
-/// Closed shapes have 0, outdoor scenes 0.9, a scanned wall 0.6.
+/// Share of the area that an open ground shows from above more than from below. Scanned walls have
+/// 0.6, outdoor scenes 0.9.
 constexpr double kGroundShare = 0.8;
 /// Ground is at most as high as this share of its longer side.
 constexpr double kGroundHeight = 0.5;
@@ -132,8 +132,9 @@ int height_of_map(const TriMesh& mesh) {
 
 bool is_ground(const Shape& shape, int up) {
   const glm::dvec3 sides = shape.sides();
-  return shape.facing[up] >= kGroundShare &&
-         sides[up] <= kGroundHeight * std::max(sides[0], sides[3 - up]) && sides[up] > 0;
+  const double longer = std::max(sides[0], sides[3 - up]);
+  return shape.facing[up] >= kGroundShare && sides[up] <= kGroundHeight * longer &&
+         sides[up] > kFlatShare * longer;
 }
 
 /// Taller than wide along `up`, with a base at its lower end and none along `other`.

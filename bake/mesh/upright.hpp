@@ -6,6 +6,10 @@
 
 namespace modar {
 
+/// An axis along which a model has at most this share of its largest side is one that it is flat
+/// in.
+inline constexpr double kFlatShare = 1e-4;
+
 /// The mesh's own statement, unless it rests on mere convention and the geometry is beyond doubt:
 /// map coordinates, open ground seen from above, or a tall shape with a base at one end only.
 /// Chooses between +y and +z, the two axes that exporters use. Deterministic.

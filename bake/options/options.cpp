@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <string_view>
 
 #include "bake/options/request_text.hpp"
 #include "formats/base/path.hpp"
@@ -34,19 +36,19 @@ constexpr TextOption kDevice = {
       return names;
     },
     plan_for_device,
-    [](const BakeRequest& request, const char* meta, Json& options) {
-      options.set(meta, request.device);
+    [](const BakeRequest& request, const char* name, Json& options) {
+      options.set(name, request.device);
     },
-    [](const Json& options, const char* meta, BakeRequest& request) {
-      static_cast<void>(plan_for_device(text_at(options, meta), request));
+    [](const Json& options, const char* name, BakeRequest& request) {
+      static_cast<void>(plan_for_device(text_at(options, name), request));
     }};
 
 constexpr TextOption kTier = {tier_names, plan_for_tier,
-                              [](const BakeRequest& request, const char* meta, Json& options) {
-                                options.set(meta, request.tier);
+                              [](const BakeRequest& request, const char* name, Json& options) {
+                                options.set(name, request.tier);
                               },
-                              [](const Json& options, const char* meta, BakeRequest& request) {
-                                static_cast<void>(plan_for_tier(text_at(options, meta), request));
+                              [](const Json& options, const char* name, BakeRequest& request) {
+                                static_cast<void>(plan_for_tier(text_at(options, name), request));
                               }};
 
 constexpr TextOption kMaxError = {
@@ -55,14 +57,14 @@ constexpr TextOption kMaxError = {
       MODAR_ASSIGN(request.max_error, parse_max_error(text));
       return {};
     },
-    [](const BakeRequest& request, const char* meta, Json& options) {
-      options.set(meta, request.max_error.value);
-      options.set(std::string(meta) + "_unit",
+    [](const BakeRequest& request, const char* name, Json& options) {
+      options.set(name, request.max_error.value);
+      options.set(std::string(name) + "-unit",
                   kMaxErrorUnits[static_cast<std::size_t>(request.max_error.unit)]);
     },
-    [](const Json& options, const char* meta, BakeRequest& request) {
-      restore_number(options, meta, request.max_error.value);
-      const std::string unit = text_at(options, (std::string(meta) + "_unit").c_str());
+    [](const Json& options, const char* name, BakeRequest& request) {
+      restore_number(options, name, request.max_error.value);
+      const std::string unit = text_at(options, (std::string(name) + "-unit").c_str());
       const auto* found = std::find(std::begin(kMaxErrorUnits), std::end(kMaxErrorUnits), unit);
       if (found == std::end(kMaxErrorUnits)) return;
       request.max_error.unit = static_cast<MaxError::Unit>(found - std::begin(kMaxErrorUnits));
@@ -74,11 +76,11 @@ constexpr TextOption kUnit = {
       MODAR_ASSIGN(request.unit_metres, parse_unit(text));
       return {};
     },
-    [](const BakeRequest& request, const char* meta, Json& options) {
-      options.set(meta, request.unit_metres);
+    [](const BakeRequest& request, const char* name, Json& options) {
+      options.set(name, request.unit_metres);
     },
-    [](const Json& options, const char* meta, BakeRequest& request) {
-      restore_number(options, meta, request.unit_metres);
+    [](const Json& options, const char* name, BakeRequest& request) {
+      restore_number(options, name, request.unit_metres);
     }};
 
 constexpr TextOption kUp = {
@@ -87,11 +89,11 @@ constexpr TextOption kUp = {
       MODAR_ASSIGN(request.up, parse_up(text));
       return {};
     },
-    [](const BakeRequest& request, const char* meta, Json& options) {
-      options.set(meta, request.up ? up_axis_name(*request.up) : "");
+    [](const BakeRequest& request, const char* name, Json& options) {
+      options.set(name, request.up ? up_axis_name(*request.up) : "");
     },
-    [](const Json& options, const char* meta, BakeRequest& request) {
-      request.up = up_axis_of(text_at(options, meta));
+    [](const Json& options, const char* name, BakeRequest& request) {
+      request.up = up_axis_of(text_at(options, name));
     }};
 
 /// The meta text has the picture's name; its path is that of a source of this name.
@@ -100,39 +102,39 @@ constexpr TextOption kLight = {nullptr,
                                  request.light = text;
                                  return {};
                                },
-                               [](const BakeRequest& request, const char* meta, Json& options) {
-                                 options.set(meta, file_name(request.light));
+                               [](const BakeRequest& request, const char* name, Json& options) {
+                                 options.set(name, file_name(request.light));
                                },
-                               [](const Json& options, const char* meta, BakeRequest& request) {
-                                 request.light = source_picture(request, text_at(options, meta));
+                               [](const Json& options, const char* name, BakeRequest& request) {
+                                 request.light = source_picture(request, text_at(options, name));
                                }};
 
 constexpr WordsOption kParameters = {
     [] {
-      std::vector<std::string> names = {"none"};
+      std::vector<std::string> names = {"none", "all"};
       for (const auto& set : paper_parameter_sets()) names.emplace_back(parameter_set_name(set.id));
       return names;
     },
     [](BakeRequest& request) -> std::vector<std::string>& { return request.parameters; }};
 
 constexpr BakeOption kOptions[] = {
-    {"--device", "device", "device", Part::kModel, Group::kTarget, "NAME", "mali400",
+    {"--device", "device", Part::kModel, Group::kTarget, "NAME", "mali400",
      "Fit a device's texture size and GPU memory", kDevice},
-    {"--tier", "tier", "tier", Part::kModel, Group::kTarget, "TIER", "phone",
+    {"--tier", "tier", Part::kModel, Group::kTarget, "TIER", "phone",
      "Reduce models: thumb has 20,000 triangles and textures of 512 pixels, phone 100,000 "
      "and 2048, desktop 150,000 and 4096",
      kTier},
-    {"--lods,--no-lods", "lods", "lods", Part::kModel, Group::kGeometry, nullptr, "4",
+    {"--lods,--no-lods", "lods", Part::kModel, Group::kGeometry, nullptr, "4",
      "Most levels of detail, including the finest; each has half the triangles of the one before "
      "(a "
      "quarter above 300,000)",
      NumberOption{[](BakeRequest& r) -> std::uint32_t& { return r.levels; }, 1, kMaxLevels}},
-    {"--max-error", "max-error", "max_error", Part::kModel, Group::kGeometry, "LENGTH", "0.01%",
+    {"--max-error", "max-error", Part::kModel, Group::kGeometry, "LENGTH", "0.01%",
      "Largest error of stored positions: in source units, as a percentage of the diagonal (0.01%), "
      "or "
      "as a length (2mm, with a unit)",
      kMaxError},
-    {"--positions", "positions", "positions", Part::kModel, Group::kGeometry, "FORMAT", "int16",
+    {"--positions", "positions", Part::kModel, Group::kGeometry, "FORMAT", "int16",
      "Position format; without it half, or int16 or float if the largest error or a fine mesh "
      "requires it",
      WordOption{
@@ -142,15 +144,15 @@ constexpr BakeOption kOptions[] = {
            r.positions = word < 0 ? std::nullopt : std::optional(static_cast<PositionKind>(word));
          },
          "auto", false}},
-    {"--no-ao", "occlusion", "occlusion", Part::kModel, Group::kGeometry, nullptr, "false",
+    {"--no-occlusion", "occlusion", Part::kModel, Group::kGeometry, nullptr, "false",
      "Store ambient occlusion", TruthOption{[](BakeRequest& r) -> bool& { return r.occlusion; }}},
-    {"--no-shadows", "shadows", "shadows", Part::kScene, Group::kGeometry, nullptr, "false",
+    {"--no-shadows", "shadows", Part::kScene, Group::kGeometry, nullptr, "false",
      "Bake models' shadows on their patterns",
      TruthOption{[](BakeRequest& r) -> bool& { return r.shadows; }}},
-    {"--topology,--no-topology", "topology", "topology", Part::kModel, Group::kGeometry, nullptr,
-     "true", "Measure the models' topology and store the result in the bundle",
+    {"--topology,--no-topology", "topology", Part::kModel, Group::kGeometry, nullptr, "true",
+     "Measure the models' topology and store the result in the bundle",
      TruthOption{[](BakeRequest& r) -> bool& { return r.topology; }}},
-    {"--atlas,--no-atlas", "atlas", "atlas", Part::kModel, Group::kTextures, nullptr, "true",
+    {"--atlas,--no-atlas", "atlas", Part::kModel, Group::kTextures, nullptr, "true",
      "Repack the used parts of textures onto shared pages (without it, if it saves a third of the "
      "bytes "
      "or half of the materials)",
@@ -165,39 +167,60 @@ constexpr BakeOption kOptions[] = {
                                         : AtlasMode::kNever;
                 },
                 "where it pays", true}},
-    {"--effort", "effort", "effort", Part::kModel, Group::kTextures, "EFFORT", "best",
+    {"--effort", "effort", Part::kModel, Group::kTextures, "EFFORT", "best",
      "Effort of the ETC1 encoder",
      WordOption{
          kEfforts, [](const BakeRequest& r) { return static_cast<int>(r.textures.effort); },
          [](BakeRequest& r, int word) { r.textures.effort = static_cast<TextureEffort>(word); },
          nullptr, false}},
-    {"--perceptual", "perceptual", "perceptual", Part::kModel, Group::kTextures, nullptr, "true",
+    {"--perceptual", "perceptual", Part::kModel, Group::kTextures, nullptr, "true",
      "Weight ETC1 errors by luma",
      TruthOption{[](BakeRequest& r) -> bool& { return r.textures.perceptual; }}},
-    {"--max-texture", "max-texture", "max_texture", Part::kModel, Group::kTextures, nullptr, "512",
+    {"--max-texture", "max-texture", Part::kModel, Group::kTextures, nullptr, "512",
      "Longest side of a texture, in pixels",
      NumberOption{[](BakeRequest& r) -> std::uint32_t& { return r.textures.max_side; }, 4,
                   kMaxTextureSide}},
-    {"--no-mipmaps", "mipmaps", "mipmaps", Part::kModel, Group::kTextures, nullptr, "false",
+    {"--no-mipmaps", "mipmaps", Part::kModel, Group::kTextures, nullptr, "false",
      "Store the smaller mip levels of textures",
      TruthOption{[](BakeRequest& r) -> bool& { return r.textures.mipmaps; }}},
-    {"--loop-views", "loop-views", "loop_views", Part::kPattern, Group::kPatterns, nullptr, "60",
+    {"--loop-views", "loop-views", Part::kPattern, Group::kPatterns, nullptr, "60",
      "Random views that test a pattern's features: fewer bake faster, more are more robust",
      NumberOption{[](BakeRequest& r) -> std::uint32_t& { return r.loop.trial_views; }, 1, 10000}},
-    {"--no-score", "score", "score", Part::kPattern, Group::kPatterns, nullptr, "false",
+    {"--no-score", "score", Part::kPattern, Group::kPatterns, nullptr, "false",
      "Score the patterns", TruthOption{[](BakeRequest& r) -> bool& { return r.loop.score; }}},
-    {"--unit", "unit", "unit_metres", Part::kModel, Group::kTarget, nullptr, "mm",
+    {"--unit", "unit", Part::kModel, Group::kTarget, nullptr, "mm",
      "Unit of the models' coordinates", kUnit},
-    {"--up", "up", "up", Part::kModel, Group::kGeometry, "AXIS", "z",
+    {"--up", "up", Part::kModel, Group::kGeometry, "AXIS", "z",
      "Axis of the models that points up, in scenes that name none; without it, as each file says",
      kUp},
-    {"--light", "light", "light", Part::kProject, Group::kTarget, "FILE", "room.hdr",
+    {"--light", "light", Part::kProject, Group::kTarget, "FILE", "room.hdr",
      "Radiance HDR panorama or photo of the room that lights scenes without a light of their own",
      kLight},
-    {"--parameters", "parameters", "parameters", Part::kPattern, Group::kPatterns, "SET,SET",
-     "none", "Keypoints of the ModAR paper's method to store as well; without it, all",
+    {"--parameters", "parameters", Part::kPattern, Group::kPatterns, "SET,SET", "none",
+     "Keypoints of the ModAR paper's method to store as well; without it orb-2000, with --device "
+     "none",
      kParameters},
+    {"--crease", "crease", Part::kModel, Group::kGeometry, "DEGREES", "30",
+     "Angle between faces above which an edge stays sharp, where the file states no normals and no "
+     "smoothing groups",
+     NumberOption{[](BakeRequest& r) -> std::uint32_t& { return r.crease; }, 0, 180}},
+    {"--smooth", "smooth", Part::kModel, Group::kGeometry, nullptr, "true",
+     "Smooth all edges where the file states no normals and no smoothing groups",
+     TruthOption{[](BakeRequest& r) -> bool& { return r.smooth; }}},
 };
+
+/// Whether the flags are "--" or "--no-" and the name.
+constexpr bool one_spelling(const BakeOption& option) {
+  std::string_view flags = option.flag;
+  while (!flags.empty()) {
+    std::string_view flag = flags.substr(0, flags.find(','));
+    flags.remove_prefix(std::min(flags.size(), flag.size() + 1));
+    flag.remove_prefix(flag.starts_with("--no-") ? 5 : 2);
+    if (flag != option.name) return false;
+  }
+  return true;
+}
+static_assert(std::all_of(std::begin(kOptions), std::end(kOptions), one_spelling));
 
 /// Of a variant's kinds, one function each.
 template <class... Functions>
@@ -233,8 +256,8 @@ Result<void> take_number(const NumberOption& number, const std::string& text,
   return {};
 }
 
-Result<void> take_word(const WordOption& word, const BakeOption& option, const std::string& text,
-                       BakeRequest& request) {
+Result<void> parse_word(const WordOption& word, const BakeOption& option, const std::string& text,
+                        BakeRequest& request) {
   std::vector<std::string> names = option_choices(option);
   if (word.truth) names = {"false", "true"};
   const auto found = std::find(names.begin(), names.end(), text);
@@ -243,7 +266,7 @@ Result<void> take_word(const WordOption& word, const BakeOption& option, const s
   return {};
 }
 
-Result<void> take_words(const WordsOption& words, const std::string& text, BakeRequest& request) {
+Result<void> parse_words(const WordsOption& words, const std::string& text, BakeRequest& request) {
   const std::vector<std::string> known = words.choices();
   std::vector<std::string>& values = words.at(request);
   values.clear();
@@ -332,7 +355,7 @@ std::string option_summary(const BakeOption& option) {
   return help.substr(0, std::min({help.find(" ("), help.find(": "), help.find("; ")}));
 }
 
-Result<void> take_option(const BakeOption& option, const std::string& text, BakeRequest& request) {
+Result<void> parse_option(const BakeOption& option, const std::string& text, BakeRequest& request) {
   return std::visit(
       Each{[&](const TruthOption& truth) -> Result<void> {
              if (text != "true" && text != "false") return bad_value(text, "write true or false");
@@ -340,10 +363,23 @@ Result<void> take_option(const BakeOption& option, const std::string& text, Bake
              return {};
            },
            [&](const NumberOption& number) { return take_number(number, text, request); },
-           [&](const WordOption& word) { return take_word(word, option, text, request); },
+           [&](const WordOption& word) { return parse_word(word, option, text, request); },
            [&](const TextOption& value) { return value.take(text, request); },
-           [&](const WordsOption& words) { return take_words(words, text, request); }},
+           [&](const WordsOption& words) { return parse_words(words, text, request); }},
       option.value);
+}
+
+std::vector<std::string> stored_parameters(const BakeRequest& request) {
+  std::vector<std::string> asked = request.parameters;
+  if (asked.empty()) asked = {request.device.empty() ? kDefaultParameterSet : "none"};
+  std::vector<std::string> stored;
+  for (const ParameterSetRecord& set : paper_parameter_sets()) {
+    const auto named = [&](const std::string& word) {
+      return word == "all" || word == parameter_set_name(set.id);
+    };
+    if (std::ranges::any_of(asked, named)) stored.emplace_back(parameter_set_name(set.id));
+  }
+  return stored;
 }
 
 void plan_request(BakeRequest& request) {
@@ -357,17 +393,17 @@ Json state_options(const BakeRequest& request) {
   for (const BakeOption& option : kOptions) {
     std::visit(
         Each{
-            [&](const TruthOption& truth) { options.set(option.meta, truth.at(own)); },
-            [&](const NumberOption& number) { options.set(option.meta, number.at(own)); },
+            [&](const TruthOption& truth) { options.set(option.name, truth.at(own)); },
+            [&](const NumberOption& number) { options.set(option.name, number.at(own)); },
             [&](const WordOption& word) {
               const int chosen = word.get(own);
-              options.set(option.meta, word.none == nullptr ? Json(chosen)
+              options.set(option.name, word.none == nullptr ? Json(chosen)
                                        : chosen < 0
                                            ? Json(word.none)
                                            : Json(word.words[static_cast<std::size_t>(chosen)]));
             },
-            [&](const TextOption& text) { text.state(own, option.meta, options); },
-            [&](const WordsOption& words) { options.set(option.meta, Json::list(words.at(own))); }},
+            [&](const TextOption& text) { text.state(own, option.name, options); },
+            [&](const WordsOption& words) { options.set(option.name, Json::list(words.at(own))); }},
         option.value);
   }
   return options;
@@ -375,7 +411,7 @@ Json state_options(const BakeRequest& request) {
 
 void restore_options(const Json& options, BakeRequest& request) {
   for (const BakeOption& option : kOptions) {
-    const Json stated = options.find(option.meta).value_or(Json());
+    const Json stated = options.find(option.name).value_or(Json());
     std::visit(Each{[&](const TruthOption& truth) {
                       truth.at(request) = stated.truth().value_or(truth.at(request));
                     },
@@ -385,7 +421,7 @@ void restore_options(const Json& options, BakeRequest& request) {
                       number.at(request) = static_cast<std::uint32_t>(*count);
                     },
                     [&](const WordOption& word) { restore_word(word, stated, request); },
-                    [&](const TextOption& text) { text.restore(options, option.meta, request); },
+                    [&](const TextOption& text) { text.restore(options, option.name, request); },
                     [&](const WordsOption& words) { restore_words(words, stated, request); }},
                option.value);
   }

@@ -49,9 +49,9 @@ struct TextOption {
   std::vector<std::string> (*choices)();  ///< null: any text
   /// Errors: kUsage, as the reader of the text says.
   Result<void> (*take)(const std::string& text, BakeRequest&);
-  void (*state)(const BakeRequest&, const char* meta, Json& options);
-  /// options: the "options" of anyone's meta text. What is wrong there changes nothing.
-  void (*restore)(const Json& options, const char* meta, BakeRequest&);
+  void (*state)(const BakeRequest&, const char* name, Json& options);
+  // / options: the "options" of anyone's meta text. Errors there change nothing.
+  void (*restore)(const Json& options, const char* name, BakeRequest&);
 };
 
 /// Several words.
@@ -63,15 +63,14 @@ struct WordsOption {
 using OptionValue = std::variant<TruthOption, NumberOption, WordOption, TextOption, WordsOption>;
 
 struct BakeOption {
-  /// "--effort"; flags: "--perceptual" (true), "--no-ao" (false), "--atlas,--no-atlas". Of a
-  /// number, "--no-lods" stands for its least.
+  /// "--effort"; flags: "--perceptual" (true), "--no-score" (false), "--atlas,--no-atlas". Of a
+  /// number, "--no-lods" means its least.
   const char* flag;
-  const char* key;   ///< in modar.toml
-  const char* meta;  ///< in "options" of the bundle's meta text
+  const char* name;  ///< in modar.toml and in "options" of the bundle's meta text
   OptionPart part;
   OptionGroup group;
   const char* type;     ///< name of the value in --help; null: as its kind says
-  const char* example;  ///< a value as take_option() reads it
+  const char* example;  ///< a value as parse_option() reads it
   const char* help;     ///< what it sets, as an order: "Store ..."
   OptionValue value;
 };
@@ -82,7 +81,7 @@ std::span<const BakeOption> bake_options();
 /// The values that an option takes; empty: any. In the order of the table.
 std::vector<std::string> option_choices(const BakeOption& option);
 
-/// The value of a request that sets nothing, as modar.toml has it; null: there is none.
+/// The value of a request that sets nothing, as modar.toml has it; null: none exists.
 Json option_default(const BakeOption& option);
 
 /// The help of an option with its values, limits and default: "Effort ... (fast, good or best;
@@ -94,7 +93,11 @@ std::string option_summary(const BakeOption& option);
 
 /// Takes a value as text; truths are "true" and "false", lists have commas between their parts.
 /// Errors: kInvalidInput "project.value", kUsage of the readers of texts.
-Result<void> take_option(const BakeOption& option, const std::string& text, BakeRequest& request);
+Result<void> parse_option(const BakeOption& option, const std::string& text, BakeRequest& request);
+
+/// The ModAR paper's parameter sets that a bake of the request stores, in the paper's order.
+/// Without `parameters`: kDefaultParameterSet, or for a device none.
+std::vector<std::string> stored_parameters(const BakeRequest& request);
 
 /// Lowers sizes once more to what the device and the tier of the request allow: after all options.
 void plan_request(BakeRequest& request);

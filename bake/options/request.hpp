@@ -1,4 +1,4 @@
-// What a bake is asked for: files, where models stand, and every option.
+// The request for a bake: files, where models stand, and every option.
 #pragma once
 
 #include <array>
@@ -34,11 +34,11 @@ struct ModelRequest {
 struct PatternRequest {
   std::string path;
   double width_mm = 0.0;  ///< 0: what the file or the shape states, or unknown
-  ShapeRequest shape{};   ///< what it is printed on; flat where nothing is told
+  ShapeRequest shape{};   ///< what it is printed on; flat where nothing is stated
   std::string name = {};  ///< empty: as name_assets() says
 };
 
-/// How far packed positions may lie from the source's, as the user says it.
+/// How far packed positions may be from the source's, as the user states it.
 struct MaxError {
   enum class Unit : std::uint8_t { kAny, kSource, kPercent, kMetres };
   Unit unit = Unit::kAny;
@@ -74,7 +74,7 @@ struct SceneRequest {
   SceneSize size;
   std::optional<UpAxis> up;      ///< points out of the pattern; nothing: as find_up() says
   std::array<double, 3> turn{};  ///< degrees about the pattern's x, y and z, in this order
-  bool centred = false;  ///< the model's centre lies in the pattern's plane; else it stands on it
+  bool centred = false;  ///< the model's centre is in the pattern's plane; else its bottom is on it
   SceneOffset offset;
   std::string light;    ///< picture of its room, see read_light(); empty: a neutral room
   std::string name;     ///< what actions call it; empty: as the model
@@ -85,7 +85,7 @@ struct SceneRequest {
 /// Words by language: {"en", "The rim"}.
 using Words = std::map<std::string, std::string>;
 
-/// A picture, a video or a label that stands on a pattern, or a sound.
+/// A picture, a video or a label on a pattern, or a sound.
 struct NodeRequest {
   NodeKind kind = NodeKind::kPicture;
   std::string file;    ///< of a picture, video or sound
@@ -99,7 +99,7 @@ struct NodeRequest {
   Words titles;
   Words texts;
   Words alts;
-  Words captions;     ///< of a video or sound; in a project the files, for the bake what is in them
+  Words captions;     ///< of a video or sound; in a project the files, for the bake their contents
   std::string where;  ///< for messages: "modar.toml:12:1"
 };
 
@@ -109,7 +109,7 @@ inline void add_files(const NodeRequest& node, std::set<std::string>& files) {
   for (const auto& [language, file] : node.captions) files.insert(file);
 }
 
-/// What is done on a pattern when something happens. Names are those of nodes, or of models.
+/// Actions on a pattern when something happens. Names are those of nodes, or of models.
 struct ActionRequest {
   std::string pattern;
   ActionEvent event = ActionEvent::kFound;
@@ -142,6 +142,9 @@ struct BakeRequest {
   std::optional<PositionKind> positions;  ///< nothing: as max_error needs it
   /// Of detail a chunk at most, the finest counted: halving ends before for all but huge chunks.
   std::uint32_t levels = kMaxLevels;
+  std::uint32_t crease = 40;  ///< see WeldOptions
+  bool smooth = false;        ///< as a crease of 180
+  [[nodiscard]] double crease_degrees() const { return smooth ? 180.0 : crease; }
   bool occlusion = true;  ///< measure and store it
   AtlasMode atlas = AtlasMode::kWhereItPays;
   bool topology = false;           ///< measure and state each model's
@@ -150,10 +153,11 @@ struct BakeRequest {
   std::string tier;                ///< that it is made for; empty: none
   unsigned jobs = 1;               ///< the bytes do not depend on it
   TrackerRecordOptions loop;       ///< of patterns; its jobs are those above
-  /// The ModAR paper's parameter sets to describe patterns with; empty: all; "none": the tracker
-  /// record alone.
+  /// The ModAR paper's parameter sets to describe patterns with, or "all" or "none"; empty: see
+  /// stored_parameters().
   std::vector<std::string> parameters;
   std::string tool_version;
+  std::string within;  ///< models read no files outside of this folder; empty: they may
 };
 
 /// Lowers texture sizes and their budget to what a device profile allows: half of its GPU memory,
@@ -167,7 +171,7 @@ Result<void> plan_for_device(const std::string& device, BakeRequest& request);
 Result<void> plan_for_tier(const std::string& tier, BakeRequest& request);
 std::vector<std::string> tier_names();
 
-/// The path of the picture of that file name among the request's patterns; empty: there is none.
+/// The path of the picture of that file name among the request's patterns; empty: none exists.
 std::string source_picture(const BakeRequest& request, const std::string& file);
 
 }  // namespace modar

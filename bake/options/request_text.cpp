@@ -5,11 +5,14 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <string_view>
 #include <system_error>
 #include <tuple>
 #include <utility>
 #include <vector>
+
+#include "formats/base/address.hpp"
 
 namespace modar {
 
@@ -32,10 +35,8 @@ bool parse_number(std::string_view text, double& value) {
 
 namespace {
 
-constexpr double kMostScale = 1e6;   // beyond, floats of the record lose the offset
 constexpr double kMostOffset = 1e6;  // millimetres or sides, the same
 constexpr double kMostTurn = 360;
-constexpr double kLeastScale = 1e-6;
 constexpr double kLeastLength = 0.01;  // millimetres: less is not printed
 constexpr double kMostLength = 1e6;    // millimetres, as offsets
 
@@ -52,13 +53,30 @@ tl::unexpected<Error> scene_error(const std::string& text, const std::string& ca
   return fail(ExitCode::kUsage, "cli.scene", "--scene " + text, cause, cure);
 }
 
+/// Of a text that commas divide: whether one of them is within a number, and how to write that
+/// part.
+std::optional<WrongValue> decimal_comma(const std::vector<std::string_view>& parts) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
+    const std::string_view next = parts[i + 1];
+    if (parts[i].empty() || !is_digit(parts[i].back()) || next.empty() || !is_digit(next[0]))
+      continue;
+    const std::string whole(parts[i].data(), parts[i].size() + 1 + next.size());
+    std::string point = whole;
+    point[parts[i].size()] = '.';
+    return WrongValue{"'" + whole + "': the number contains a comma",
+                      "write " + point + ", with a point"};
+  }
+  return std::nullopt;
+}
+
 std::string number_text(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.6g", value);
   return text;
 }
 
-/// "0.8". Errors: what is wrong with it, for a message.
+/// "0.8". Errors: its fault, for a message.
 tl::expected<double, WrongValue> parse_scale(std::string_view text) {
   double value = 0;
   const bool percent = text.ends_with('%');
@@ -95,7 +113,7 @@ std::pair<std::string, std::string> split_name(const std::string& text) {
   return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
-/// The unit that a word stands for which is none: "inch", "MM".
+/// The unit meant by an unknown word: "inch", "MM".
 std::string_view meant_unit(const std::string& word) {
   constexpr std::pair<std::string_view, std::string_view> kWords[] = {
       {"inch", "in"},  {"inches", "in"}, {"\"", "in"},   {"zoll", "in"},
@@ -177,14 +195,14 @@ tl::expected<SceneOffset, WrongValue> parse_offset(std::string_view text) {
     const std::size_t digits = unit_start(parts[i]);
     const std::string unit(digits < parts[i].size() ? parts[i].substr(digits) : last);
     double& value = offset.value[i];
-    if (!parse_number(parts[i].substr(0, digits), value) || !(std::fabs(value) <= kMostOffset)) {
-      return wrong;
+    if (!parse_number(parts[i].substr(0, digits), value)) return wrong;
+    if (!unit.empty()) {
+      const Result<double> metres = parse_unit(unit);
+      if (!metres || last.empty()) return wrong;
+      offset.unit = SceneOffset::Unit::kMillimetres;
+      if (unit != "mm") value *= *metres * 1000;
     }
-    if (unit.empty()) continue;
-    const Result<double> metres = parse_unit(unit);
-    if (!metres || last.empty()) return wrong;
-    offset.unit = SceneOffset::Unit::kMillimetres;
-    if (unit != "mm") value *= *metres * 1000;
+    if (!(std::fabs(value) <= kMostOffset)) return wrong;
   }
   return offset;
 }
@@ -195,8 +213,8 @@ Result<UpAxis> parse_up(const std::string& text) {
               "name one of x, y, z, -x, -y, -z");
 }
 
-tl::expected<bool, WrongValue> take_scene_part(std::string_view key, std::string_view value,
-                                               SceneRequest& scene) {
+tl::expected<bool, WrongValue> parse_scene_part(std::string_view key, std::string_view value,
+                                                SceneRequest& scene) {
   const auto lengths = [&](SceneSize::Kind kind) -> tl::expected<bool, WrongValue> {
     scene.size.kind = kind;
     auto mm = parse_millimetres(value);
@@ -307,12 +325,13 @@ tl::expected<void, WrongValue> parse_alpha(std::string_view text, NodeRequest& n
     node.key[i] = static_cast<float>(16 * high + low) / 255.0f;
   }
   if (!good) {
-    return tl::unexpected(WrongValue{"this is not a kind of alpha",
-                                     "write none, beside (the right half is the alpha of the left "
-                                     "one) or a colour that is not seen, \"#00ff00\""});
+    return tl::unexpected(
+        WrongValue{"this is not a kind of alpha",
+                   "write `none`, `beside` (the right half is the alpha of the left "
+                   "one) or a colour that is not seen, \"#00ff00\""});
   }
   node.alpha = VideoAlpha::kKey;
-  node.reach = 0.4f;  // keyed studio green varies by so much; set by hand
+  node.reach = 0.4f;  // keyed studio green varies by this much
   return {};
 }
 
@@ -329,7 +348,12 @@ tl::expected<void, WrongValue> parse_command(std::string_view text, ActionReques
     action.command = command;
     if (command == ActionCommand::kLink) {
       action.address = std::string(rest);
-      if (rest.starts_with("https://") && rest.size() > 8) return {};
+      const char* const fault = address_fault(rest);
+      if (fault != nullptr) {
+        return tl::unexpected(WrongValue{std::string("the link is refused: ") + fault,
+                                         "write link https://museum.org/vase"});
+      }
+      if (rest.starts_with("https://")) return {};
       return tl::unexpected(
           WrongValue{"links lead to https addresses only", "write link https://museum.org/vase"});
     }
@@ -353,6 +377,7 @@ Result<SceneRequest> parse_scene(const std::string& text) {
   if (equals == std::string_view::npos || equals == 0 || equals + 1 == parts[0].size()) {
     return scene_error(text, "it does not begin with PATTERN=MODEL");
   }
+  if (const auto comma = decimal_comma(parts)) return scene_error(text, comma->cause, comma->cure);
   SceneRequest scene;
   scene.pattern = std::string(parts[0].substr(0, equals));
   scene.model = std::string(parts[0].substr(equals + 1));
@@ -365,7 +390,7 @@ Result<SceneRequest> parse_scene(const std::string& text) {
       continue;
     }
     const bool valued = key.size() < part.size();
-    auto taken = take_scene_part(key, valued ? part.substr(key.size() + 1) : "", scene);
+    auto taken = parse_scene_part(key, valued ? part.substr(key.size() + 1) : "", scene);
     const std::string quoted = "'" + std::string(part) + "'";
     if (!taken) return scene_error(text, quoted + ": " + taken.error().cause, taken.error().cure);
     if (!*taken || !valued) return scene_error(text, quoted + " is not understood");
@@ -435,11 +460,13 @@ bool looks_like_length(std::string_view tail) {
          parse_unit(std::string(tail)).has_value();
 }
 
-tl::unexpected<Error> shape_error(const std::string& text, const std::string& cause) {
-  return fail(ExitCode::kUsage, "cli.shape", "shape=" + text, cause,
-              "write cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,arc=100 or "
-              "box,size=120x180x40mm,right=FILE,back=FILE,left=FILE,top=FILE,bottom=FILE, or flat; "
-              "behind each corners=X:Y:X:Y:X:Y:X:Y,height=297mm where the file is a photo of it");
+tl::unexpected<Error> shape_error(
+    const std::string& text, const std::string& cause,
+    const std::string& cure =
+        "write cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,arc=100 or "
+        "box,size=120x180x40mm,right=FILE,back=FILE,left=FILE,top=FILE,bottom=FILE, or flat; "
+        "behind each corners=X:Y:X:Y:X:Y:X:Y,height=297mm where the file is a photo of it") {
+  return fail(ExitCode::kUsage, "cli.shape", "shape=" + text, cause, cure);
 }
 
 /// Corners within a shape, whose own parts stand between commas.
@@ -453,6 +480,7 @@ std::string commas_for_colons(std::string_view text) {
 
 Result<ShapeRequest> parse_shape(const std::string& text) {
   const std::vector<std::string_view> parts = split(text, ',');
+  if (const auto comma = decimal_comma(parts)) return shape_error(text, comma->cause, comma->cure);
   ShapeRequest shape;
   shape.text = text;
   if (parts[0] == "cylinder") {
@@ -555,6 +583,10 @@ Result<MaxError> parse_max_error(const std::string& text) {
     good = false;
   }
   if (good) return error;
+  if (const auto comma = decimal_comma(split(text, ','))) {
+    return fail(ExitCode::kUsage, "cli.max-error", "--max-error " + text, comma->cause,
+                comma->cure);
+  }
   return fail(ExitCode::kUsage, "cli.max-error", "--max-error " + text,
               "this is not a length above 0",
               "write a number of source units, a percentage of the diagonal as 0.01%, or a length "

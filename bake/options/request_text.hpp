@@ -13,15 +13,19 @@
 
 namespace modar {
 
-/// The parts between separators; one part where there is none.
+/// Of scenes: beyond the greatest, floats of the record lose the offset.
+inline constexpr double kLeastScale = 1e-6;
+inline constexpr double kMostScale = 1e6;
+
+/// The parts between separators; one part if none.
 std::vector<std::string_view> split(std::string_view text, char separator);
-/// The whole text as a finite number; false where it is none.
+/// The whole text as a finite number; false if it is not one.
 bool parse_number(std::string_view text, double& value);
 
 /// "x", "-y", "Z". Errors: kUsage "cli.up".
 Result<UpAxis> parse_up(const std::string& text);
 
-/// What is wrong with a part of a text, and how to write it.
+/// The fault of a part of a text, and how to write it.
 struct WrongValue {
   std::string cause;
   std::string cure;
@@ -38,8 +42,8 @@ tl::expected<SceneOffset, WrongValue> parse_offset(std::string_view text);
 
 /// One key of a scene (scale, height, width, up, turn, offset, light) with its value. False: there
 /// is no such key.
-tl::expected<bool, WrongValue> take_scene_part(std::string_view key, std::string_view value,
-                                               SceneRequest& scene);
+tl::expected<bool, WrongValue> parse_scene_part(std::string_view key, std::string_view value,
+                                                SceneRequest& scene);
 
 /// "found", "lost", "tap NAME" or "after 3s"; then "show NAME", "hide NAME", "toggle NAME",
 /// "text NAME", "next NAME", "play NAME", "pause NAME", "link https://...", "turn NAME by 90 [about

@@ -11,8 +11,8 @@ namespace modar {
 namespace {
 
 constexpr std::size_t kCellsOfSide = 32;  ///< cells: a title of a few letters is seen
-/// Correlation of the cells from which pictures are the same. Two scans of one print have 0.99 and
-/// more, editions in two languages 0.9 to 0.98.
+/// Correlation of the cells above which two pictures are the same. Editions in two languages have
+/// up to 0.98.
 constexpr double kAlike = 0.99;
 constexpr double kAspectShare = 0.05;  ///< by which the sides' ratios may differ
 

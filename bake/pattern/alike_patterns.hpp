@@ -8,10 +8,10 @@
 
 namespace modar {
 
-/// A warning for each pattern that looks like an earlier one, as it is or mirrored: a tracker
-/// cannot tell them apart. Compares small copies of the pictures; whether editions of one print are
-/// told apart is what `modar pattern confusion` finds out. Of curved patterns and boxes, the
-/// pictures as they are stored.
+/// A warning for each pattern that looks like an earlier one, directly or mirrored: a tracker
+/// cannot tell them apart. Compares small copies of the pictures; `modar pattern confusion` shows
+/// whether editions of one print are distinguished. Of curved patterns and boxes, the pictures as
+/// stored.
 std::vector<Diagnostic> alike_patterns(const BundleContent& content);
 
 }  // namespace modar

@@ -15,7 +15,7 @@
 namespace modar {
 namespace {
 
-/// A side of a box: its place in the common picture, and where it lies in space.
+/// A side of a box: its place in the common picture and in space.
 struct BoxSide {
   const GrayPicture* picture = nullptr;
   int place[4] = {};  ///< left, top, width, height
@@ -94,10 +94,10 @@ Result<ShapedPicture> load_box(const std::string& path, const ShapeRequest& requ
                     " pixels, which are not the proportions of its side of the box",
                 "cut it along the edges of its side, or correct size=WIDTHxHEIGHTxDEPTHmm");
   }
-  const MendedBox mended = mend_crops(pictures);
-  ShapedPicture box = assemble_box(mended.pictures, request.box_mm);
-  box.mended = mended.most;
-  box.cut_beyond = mended.beyond;
+  const CorrectedBox corrected = correct_crops(pictures);
+  ShapedPicture box = assemble_box(corrected.pictures, request.box_mm);
+  box.corrected = corrected.most;
+  box.cut_beyond = corrected.beyond;
   return box;
 }
 

@@ -11,25 +11,25 @@
 namespace modar {
 namespace {
 
-// Set by hand on cartons whose sides are cut 3 to 10 pixels off (`modar-lab bench pose --shape
-// --only "cut box"`): laxer ones mend sides whose pictures have nothing to do with each other.
-constexpr int kEdgeSamples = 200;  // along an edge
+// Samples along an edge. Looser limits than the following correct sides whose pictures are
+// unrelated.
+constexpr int kEdgeSamples = 200;
 constexpr int kSlow = 20;  // samples to either side whose mean is taken off: shading is no print
-// Shares of a picture at which its edge is read: what lies outermost may be what is behind the box.
+// Shares of a picture at which its edge is read: the outermost pixels may show the background.
 constexpr std::array<double, 4> kReadAt = {0.005, 0.02, 0.035, 0.05};
-constexpr double kMostMended = 0.03;  // share of a side by which an edge is moved
-constexpr double kShiftStep = 0.005;  // shares that are tried, then refined by a quarter
-constexpr int kShiftSteps = 14;       // to either side: two edges, both cut too far in or out
+constexpr double kMaxCorrection = 0.03;  // share of a side by which an edge is moved
+constexpr double kShiftStep = 0.005;     // shares that are tried, then refined by a quarter
+constexpr int kShiftSteps = 14;          // to either side: two edges, both cut too far in or out
 // Correlation, at the best shift, from which print runs over an edge.
 constexpr double kEdgesAlike = 0.85;
 constexpr double kLeastContrast = 30;  // variance
-// Edges that must agree. Of 24 boxes of unrelated pictures print seemed to run over none, but over
-// one of a box of made textures.
+// Edges that must agree. One alone may agree by chance.
 constexpr std::size_t kLeastEdges = 2;
 constexpr double kContradicts = 0.012;  // share by which an edge may disagree with the others
+// Weight of "nothing is off" against an edge, among shifts that agree.
 constexpr double kNothingOff =
-    0.02;                         // weight of "nothing is off" beside an edge: among all that agree
-constexpr double kMeets = 0.004;  // share below which nothing is mended
+    0.02;  // weight of "nothing is off" next to an edge: among all that agree
+constexpr double kMeets = 0.004;  // share below which nothing is corrected
 
 using Profile = std::array<double, kEdgeSamples>;
 
@@ -147,7 +147,7 @@ EdgeShift shift_of(const std::array<GrayPicture, 6>& pictures, const SharedEdge&
   return best;
 }
 
-constexpr int kUnknowns = 24;  // shares by which each end of each side lies too far out
+constexpr int kUnknowns = 24;  // shares by which each end of each side is too far out
 
 /// An equation for two of them: what the first less the second is.
 struct Difference {
@@ -200,7 +200,7 @@ double residual(const std::array<Difference, 2>& edge, const std::array<double, 
   return worst;
 }
 
-/// The picture between its side's edges; beyond its own edges it goes on as it ends.
+/// The picture between its side's edges; beyond its own edges its last pixel is repeated.
 GrayPicture cut_to_edges(const GrayPicture& picture, const double* crop) {
   const double across = 1 / (1 + crop[kLeftEnd] + crop[kRightEnd]);
   const double down = 1 / (1 + crop[kTopEnd] + crop[kBottomEnd]);
@@ -215,8 +215,8 @@ GrayPicture cut_to_edges(const GrayPicture& picture, const double* crop) {
 
 }  // namespace
 
-MendedBox mend_crops(const std::array<GrayPicture, 6>& pictures) {
-  MendedBox out{.pictures = pictures};
+CorrectedBox correct_crops(const std::array<GrayPicture, 6>& pictures) {
+  CorrectedBox out{.pictures = pictures};
   std::vector<std::array<Difference, 2>> equations;
   for (const SharedEdge& edge : kEdges) {
     if (pictures[static_cast<std::size_t>(edge.side[0])].pixels.empty() ||
@@ -232,8 +232,8 @@ MendedBox mend_crops(const std::array<GrayPicture, 6>& pictures) {
   crops = solve(equations);
   double most = 0;
   for (double& crop : crops) {
-    out.beyond = out.beyond || std::fabs(crop) > kMostMended;
-    crop = std::clamp(crop, -kMostMended, kMostMended);
+    out.beyond = out.beyond || std::fabs(crop) > kMaxCorrection;
+    crop = std::clamp(crop, -kMaxCorrection, kMaxCorrection);
     most = std::max(most, std::fabs(crop));
   }
   if (most < kMeets) return out;

@@ -36,16 +36,14 @@ constexpr int kFewestTilted = 3;
 constexpr double kTilted =
     0.97;  // cosine of 14 degrees: less tilt says nothing of the focal length
 // Standard deviation of the focal length over its value. 3 % moves a model by a fiftieth of its
-// distance, which shows beside real objects.
+// distance, which is visible next to real objects.
 constexpr double kWeakest = 0.03;
-// Degrees by which the planes' normals must scatter, see Tilts. On a video whose planes were nearly
-// parallel the solver put the principal point 220 pixels off with a small standard deviation.
+// Degrees by which the planes' normals must scatter, see Tilts. Lower accepts nearly parallel
+// planes, which give a wrong principal point.
 constexpr double kFocalScatter = 8.0;
 constexpr double kPrincipalPointScatter = 4.0;
 constexpr int kVideoFrames = 120;  // of a video that are examined: three for each view that is used
-// Times the median error, above which views are left out. Of 13 photos of a chessboard (OpenCV's
-// left*.jpg) none is from 1.5 on; 1.2 leaves some out and moves the focal length from 532.8 to
-// 532.5.
+// Times the median error, above which views are left out. Lower drops good views. [1.2, 1.5]
 constexpr double kOutlier = 3.0;
 
 /// Points of one view: on the plane (any unit) and in the frame (pixels).
@@ -76,7 +74,7 @@ PlanePoints board_points(const GrayImage& frame, int columns, int rows) {
   return points;
 }
 
-/// Brings the frame's part to the picture's mean and contrast: the optical flow assumes equal
+/// Scales the frame's part to the picture's mean and contrast: the optical flow assumes equal
 /// brightness.
 void match_light(const cv::Mat& picture, const cv::Mat& mask, cv::Mat& warped) {
   cv::Scalar mean;

@@ -86,7 +86,7 @@ Result<std::vector<std::byte>> project_of(const std::vector<NamedPattern>& patte
   return bundle_of_records(pictures, records, nullptr, shapes);
 }
 
-/// Recognitions of each of so many patterns.
+/// Recognitions of each pattern.
 Result<std::vector<int>> count_together(PoseLoop& loop, const std::vector<GrayPicture>& views,
                                         std::size_t patterns) {
   std::vector<int> counts(patterns, 0);

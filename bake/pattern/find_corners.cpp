@@ -11,46 +11,63 @@
 namespace modar {
 namespace {
 
-// The longer side that figures are looked for at: larger costs time and finds more texture. Set by
-// hand; the corners are measured on the photo itself.
+// Longer side, in pixels, at which figures are searched. Larger takes time and finds more texture;
+// corners are measured on the photo itself.
 constexpr double kSearchSide = 800;
 constexpr std::size_t kMostLines = 60;  // the longest; their pairs of pairs are tried
 constexpr double kJoinDegrees = 2.0;    // segments of one line: a photo bends lines by as much
 constexpr double kJoinPixels = 3.0;
-// Steps of a colour channel, a pixel: an edge. With 5, weak sides are lost, and 120 lines find more
-// wrong figures: 29 of 40 rendered photos were right then, 50 of 60 with these.
+// Gradient of an edge, steps of a colour channel per pixel. Higher loses weak sides, lower finds
+// more wrong figures.
 constexpr double kEdge = 3;
 // Share of an edge's strength that is left 3 pixels to either side: more is a shadow's.
 constexpr double kShadow = 0.6;
 // A figure: of the photo's area at least so much, and each corner so far from straight and closed.
 constexpr double kLeastArea = 0.04;
 constexpr double kLeastCornerDegrees = 35;
-// Share of a side along which an edge is seen. Fingers, shadows and glare hide the rest. Set by
-// hand.
+// Share of a side along which an edge is visible. Fingers, shadows and glare hide the rest.
 constexpr double kLeastSupport = 0.62;
 constexpr double kLeastSide = 0.5;  // below, a side is not even tried
 // Of a figure around the best one, and its area at most, times the best one's.
 constexpr double kOutlineSupport = 0.9;
 constexpr double kOutlineScore = 0.25;
 constexpr double kMostMargin = 1.7;
-// How far outside of a printed frame the thing's own edge is looked for, times the figure's size.
+// How far outside of a printed frame the object's own edge is looked for, times the figure's size.
 constexpr double kMostFrame = 0.06;
-// Share of a side that is sharp: on the thing's own edge, and below which a figure is none. Of 94
-// rendered photos (18 pictures before plain, blurred and sharp backgrounds, tilted at random) on
-// which these and kDoubtfulSharpness were set, 86 came out within 1.4 % of the width, 6 of them
-// doubted; 5 were refused; of 3 wrong ones 2 were doubted, and one off by 1.7 % was not. Of 160
-// with soft shadows before photos, wood and plain tables, 84 were right, 34 of them doubted, 56
-// refused; of 20 wrong ones 3, off by at most 2 %, were not doubted.
+// Share of a side that is sharp for an object's own edge. Higher refuses soft photos, lower accepts
+// shadows.
 constexpr double kSharpOutline = 0.9;
+// Share of a side that is sharp, below which a figure is refused.
 constexpr double kLeastSharp = 0.6;
 // Of a figure around the one that was chosen, which makes that doubtful.
 constexpr double kSheetSupport = 0.6;
 constexpr double kSheetLeast = 1.04;
-// Pixels beyond a corner in which edges that go on are looked for.
+// Pixels beyond a corner in which continuing edges are looked for.
 constexpr double kBeyondFrom = 4;
 constexpr double kBeyondTo = 24;
-// Share of a photo from which on it may be the picture, and what was found in it a printed frame.
+// Share of a photo from which it may be the picture, and the figure in it a printed frame.
 constexpr double kFilled = 0.8;
+// Longer side, in pixels, of the photo in which the foreground is searched.
+constexpr double kForegroundSide = 320;
+// Smallest share of the photo that the foreground has.
+constexpr double kMinForeground = 0.03;
+// Largest share of the photo that the foreground has.
+constexpr double kMaxForeground = 0.97;
+// Share of the four-sided figure around the foreground that the foreground fills.
+constexpr double kFourSided = 0.85;
+// Area, relative to the foreground's, of another object that makes it doubtful.
+constexpr double kLeastRival = 0.4;
+// From a side to the places that are compared, times the figure's size.
+constexpr double kApart = 0.02;
+// Of sharpness and division together: what another figure has to be better by.
+constexpr double kBetter = 0.1;
+// Share of the photo below which a figure that is not sharp all around is a part of a scan.
+constexpr double kLeastShare = 0.25;
+// The same for sharp figures.
+constexpr double kLeastPicture = 0.08;
+// Of the file: a larger upright figure is a frame that is printed on the picture.
+constexpr double kLeastFrontal = 0.4;
+constexpr double kUpright = 0.007;  // sine of 0.4 degrees
 
 using Point = cv::Point2d;
 
@@ -113,7 +130,7 @@ struct Gradients {
   }
 };
 
-/// Segments that lie on one another's line become one line. The longest come first.
+/// Collinear segments become one line. The longest come first.
 std::vector<Line> join_segments(std::vector<cv::Vec4f> segments) {
   const auto size = [](const cv::Vec4f& s) {
     return std::hypot(static_cast<double>(s[2] - s[0]), static_cast<double>(s[3] - s[1]));
@@ -205,6 +222,146 @@ bool convex(const std::array<Point, 4>& c) {
   return true;
 }
 
+/// The object on the background that the photo's border shows: its outline, coarsely.
+class Foreground {
+ public:
+  explicit Foreground(const cv::Mat& rgb) : scale_(kForegroundSide / std::max(rgb.cols, rgb.rows)) {
+    cv::Mat small;
+    cv::resize(rgb, small, cv::Size(), scale_, scale_, cv::INTER_AREA);
+    learn_ground(small);
+    // Ground is what the border's ground reaches: the same colours within the object are the
+    // object's.
+    cv::Mat ground(small.rows + 2, small.cols + 2, CV_8U, cv::Scalar(255));
+    small.forEach<cv::Vec3b>([&](const cv::Vec3b& colour, const int* at) {
+      ground.at<std::uint8_t>(at[0] + 1, at[1] + 1) = is_ground(colour) ? 255 : 0;
+    });
+    cv::floodFill(ground, cv::Point(0, 0), 128);
+    cv::Mat rest = ground(cv::Rect(1, 1, small.cols, small.rows)) != 128;
+    cv::morphologyEx(rest, rest, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
+    keep_largest(rest);
+  }
+
+  /// Whether it is four-sided; otherwise nothing here says anything.
+  [[nodiscard]] bool known() const { return known_; }
+  /// Whether something else of its kind is there.
+  [[nodiscard]] bool rivalled() const { return known_ && rival_ > kLeastRival; }
+  [[nodiscard]] const std::array<Point, 4>& corners() const { return corners_; }
+
+  /// How far a side divides it from the background: of the places that far to both sides of the
+  /// line, the share that is on the right one. to: clockwise of from.
+  [[nodiscard]] double divided(const Point& from, const Point& to, double apart) const {
+    const Point along = (to - from) / norm_of(to - from);
+    const Point off = std::max(apart, 1.5 / scale_) * Point(along.y, -along.x);
+    int inside = 0;
+    int outside = 0;
+    constexpr int kPlaces = 60;
+    for (int i = 0; i < kPlaces; ++i) {
+      const Point at = from + (0.05 + 0.9 * i / (kPlaces - 1)) * (to - from);
+      inside += covers(at - off) ? 1 : 0;
+      outside += covers(at + off) ? 0 : 1;
+    }
+    return static_cast<double>(std::min(inside, outside)) / kPlaces;
+  }
+  /// Of a figure, its worst side.
+  [[nodiscard]] double divided(const std::array<Point, 4>& corners) const {
+    double least = known_ ? 1 : 0;
+    const double apart = kApart * std::sqrt(area_of(corners));
+    for (std::size_t i = 0; i < 4 && known_; ++i) {
+      least = std::min(least, divided(corners[i], corners[(i + 1) % 4], apart));
+    }
+    return least;
+  }
+
+ private:
+  static constexpr std::size_t kBins = 12;  // of a channel
+
+  static std::size_t bin(double r, double g, double b) {
+    const auto one = [](double value) {
+      return static_cast<std::size_t>(std::clamp(value * kBins / 256, 0.0, kBins - 1.0));
+    };
+    return (one(r) * kBins + one(g)) * kBins + one(b);
+  }
+
+  void learn_ground(const cv::Mat& small) {
+    constexpr int kRing = 4;      // pixels
+    constexpr double kBlur = 10;  // steps of a channel: a colour counts for its neighbours, too
+    constexpr double kMinColourShare = 0.004;  // of the ring: rarer colours are chance
+    ground_.assign(kBins * kBins * kBins, 0);
+    int count = 0;
+    for (int y = 0; y < small.rows; ++y) {
+      for (int x = 0; x < small.cols; ++x) {
+        if (y >= kRing && y < small.rows - kRing && x >= kRing && x < small.cols - kRing) continue;
+        const auto& c = small.at<cv::Vec3b>(y, x);
+        for (int k = 0; k < 27; ++k) {
+          ground_[bin(c[0] + kBlur * (k % 3 - 1), c[1] + kBlur * (k / 3 % 3 - 1),
+                      c[2] + kBlur * (k / 9 - 1))] += 1;
+        }
+        ++count;
+      }
+    }
+    least_ = 27 * kMinColourShare * count;
+  }
+
+  /// In the light or in a shadow.
+  [[nodiscard]] bool is_ground(const cv::Vec3b& c) const {
+    constexpr double kShades[] = {1.0, 1.15, 1.35, 1.6, 2.0};
+    return std::ranges::any_of(kShades, [&](double lit) {
+      return ground_[bin(lit * c[0], lit * c[1], lit * c[2])] >= least_;
+    });
+  }
+
+  void keep_largest(const cv::Mat& rest) {
+    cv::Mat labels;
+    cv::Mat stats;
+    cv::Mat centres;
+    const int parts = cv::connectedComponentsWithStats(rest, labels, stats, centres, 4);
+    std::vector<std::pair<int, int>> areas;  // with their labels
+    for (int i = 1; i < parts; ++i) areas.emplace_back(stats.at<int>(i, cv::CC_STAT_AREA), i);
+    std::ranges::sort(areas, std::greater());
+    if (areas.empty()) return;
+    mask_ = labels == areas[0].second;
+    rival_ = areas.size() > 1 ? 1.0 * areas[1].first / areas[0].first : 0;
+    const double share = 1.0 * areas[0].first / static_cast<double>(rest.total());
+    known_ = share > kMinForeground && share < kMaxForeground && fit_corners();
+  }
+
+  /// The four-sided figure of its hull.
+  bool fit_corners() {
+    std::vector<std::vector<cv::Point>> outlines;
+    cv::findContours(mask_, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
+    std::vector<cv::Point> hull;
+    cv::convexHull(outlines.front(), hull);
+    std::vector<cv::Point> four;
+    for (double off = 1; off < kForegroundSide / 8 && (four.empty() || four.size() > 4); off += 1) {
+      cv::approxPolyDP(hull, four, off, true);
+    }
+    if (four.size() != 4) return false;
+    cv::Mat figure = cv::Mat::zeros(mask_.size(), CV_8U);
+    cv::fillConvexPoly(figure, four, 255);
+    for (std::size_t i = 0; i < 4; ++i) {
+      corners_[i] = (Point(four[i]) + Point(0.5, 0.5)) / scale_ - Point(0.5, 0.5);
+    }
+    corners_ = clockwise(corners_);
+    return convex(corners_) &&
+           cv::countNonZero(figure & mask_) > kFourSided * cv::countNonZero(figure | mask_);
+  }
+
+  [[nodiscard]] bool covers(const Point& at) const {
+    const auto x = static_cast<int>(std::lround((at.x + 0.5) * scale_ - 0.5));
+    const auto y = static_cast<int>(std::lround((at.y + 0.5) * scale_ - 0.5));
+    return x >= 0 && y >= 0 && x < mask_.cols && y < mask_.rows &&
+           mask_.at<std::uint8_t>(y, x) != 0;
+  }
+
+  double scale_;
+  std::vector<double> ground_;  ///< how often each colour is on the border
+  double least_ = 0;
+  cv::Mat mask_;
+  std::array<Point, 4> corners_;
+  bool known_ = false;
+  double rival_ = 0;
+};
+
 class Search {
  public:
   Search(const cv::Mat& rgb, std::vector<Line> lines)
@@ -259,7 +416,7 @@ class Search {
     }
     corners = clockwise(corners);
     if (!convex(corners)) return;
-    // An edge that goes on beyond a corner belongs to something larger.
+    // An edge that continues beyond a corner belongs to something larger.
     double beyond = 0;
     for (std::size_t i = 0; i < 4; ++i) {
       const Point& from = corners[i];
@@ -294,7 +451,7 @@ bool fit_side(const Gradients& gradients, const Point& from, const Point& to, do
     double best = 0;
     double where = 0;
     const auto strength = [&](double off) {
-      // The nearer edge counts more: a printed frame may lie within reach.
+      // The nearer edge counts more: a printed frame may be within reach.
       return std::fabs(gradients.across(at + off * normal, normal)) *
              std::exp(-off * off / (reach * reach));
     };
@@ -351,8 +508,8 @@ double least_sharp(const Gradients& gradients, const std::array<Point, 4>& corne
   return least;
 }
 
-/// Sides that stopped at a printed frame, with one end or both, go on to the thing's own edge: the
-/// outermost that is sharp all along.
+/// Sides that stopped at a printed frame, with one end or both, continue to the object's own edge:
+/// the outermost that is sharp all along.
 std::array<Point, 4> push_out(const Gradients& gradients, const std::array<Point, 4>& corners) {
   const double reach = kMostFrame * std::sqrt(area_of(corners));
   std::array<Line, 4> sides;
@@ -372,6 +529,44 @@ std::array<Point, 4> push_out(const Gradients& gradients, const std::array<Point
         if (sharp_along(gradients, start, end, true) < kSharpOutline) continue;
         farthest = a + b;
         sides[i] = {start, (end - start) / norm_of(end - start), long_as, {}, 0};
+      }
+    }
+  }
+  std::array<Point, 4> next = corners;
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (!intersect(sides[(i + 3) % 4], sides[i], next[i])) return corners;
+  }
+  return next;
+}
+
+/// Moves sides that stopped at a shadow or a printed frame to the edge that divides the object from
+/// its background.
+std::array<Point, 4> settle(const Gradients& gradients, const Foreground& object,
+                            const std::array<Point, 4>& corners) {
+  constexpr double kSharp = 0.3;   // weight of an edge's sharpness against the division
+  constexpr double kWorth = 0.15;  // a side moves for more than that
+  const double size = std::sqrt(area_of(corners));
+  const double reach = kMostFrame * size;
+  const double step = std::max(1.0, reach / 16);
+  std::array<Line, 4> sides;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Point& from = corners[i];
+    const Point& to = corners[(i + 1) % 4];
+    const Point along = (to - from) / norm_of(to - from);
+    const Point outward(along.y, -along.x);
+    sides[i] = {from, along, 0, {}, 0};
+    double best = object.divided(from, to, kApart * size) +
+                  kSharp * sharp_along(gradients, from, to) + kWorth;
+    for (double a = -reach; a <= reach && best < 1 + kSharp; a += step) {
+      for (double b = -reach; b <= reach; b += step) {
+        const Point start = from + a * outward;
+        const Point end = to + b * outward;
+        const double division = object.divided(start, end, kApart * size);
+        if (division + kSharp <= best) continue;
+        const double here = division + kSharp * sharp_along(gradients, start, end);
+        if (here <= best) continue;
+        best = here;
+        sides[i] = {start, (end - start) / norm_of(end - start), 0, {}, 0};
       }
     }
   }
@@ -402,7 +597,7 @@ std::array<Point, 4> refine(const Gradients& gradients, std::array<Point, 4> cor
   return corners;
 }
 
-/// Whether all corners of a figure lie within another's, or at most two pixels beyond.
+/// Whether all corners of a figure are within another's, or at most two pixels beyond.
 bool around(const std::array<Point, 4>& outer, const std::array<Point, 4>& inner) {
   for (std::size_t i = 0; i < 4; ++i) {
     const Point side = outer[(i + 1) % 4] - outer[i];
@@ -413,7 +608,7 @@ bool around(const std::array<Point, 4>& outer, const std::array<Point, 4>& inner
   return true;
 }
 
-/// Whether another figure of edges, which stands out less, lies around one: the sheet, perhaps, on
+/// Whether another figure of edges, with less contrast, surrounds one: the sheet, perhaps, on
 /// which that is printed.
 bool framed(const std::vector<Figure>& figures, const std::array<Point, 4>& corners) {
   const double area = area_of(corners);
@@ -424,7 +619,7 @@ bool framed(const std::vector<Figure>& figures, const std::array<Point, 4>& corn
   });
 }
 
-/// Whether the two edges that end at a side go on beyond it, as those of a longer thing do.
+/// Whether the two edges that end at a side continue beyond it, as those of a longer object do.
 bool goes_on(const Gradients& gradients, const std::array<Point, 4>& corners) {
   const auto beyond = [&](const Point& from, const Point& corner) {
     const Point along = (corner - from) / norm_of(corner - from);
@@ -440,8 +635,8 @@ bool goes_on(const Gradients& gradients, const std::array<Point, 4>& corners) {
   return false;
 }
 
-/// Printed frames lie within a thing's own edges: the largest figure around the best one that
-/// stands out nearly as well.
+/// Printed frames are inside an object's own edges: the largest figure around the best one that has
+/// nearly its contrast.
 const Figure& outermost(const std::vector<Figure>& figures) {
   const Figure& best = figures.front();
   const Figure* chosen = &best;
@@ -460,7 +655,7 @@ tl::unexpected<Error> not_found(const char* cause) {
   return fail(
       ExitCode::kInvalidInput, "rectify.not-found", "", cause,
       "pass the four corners with --corners, or take a photo that shows all edges on a plain "
-      "background; a scan or a frontal picture is baked as it is");
+      "background; a scan or a frontal picture is baked unchanged");
 }
 
 /// Another figure of about the same score that is neither within the best one nor nearly it.
@@ -480,6 +675,47 @@ bool rivalled(const std::vector<Figure>& figures) {
   return false;
 }
 
+/// Lines of the photo in all colours, the longest first.
+std::vector<Line> lines_of(const cv::Mat& rgb, const Gradients& gradients) {
+  std::vector<cv::Vec4f> segments;
+  const auto detector = cv::createLineSegmentDetector(cv::LSD_REFINE_STD);
+  std::array<cv::Mat, 3> channels;
+  cv::split(rgb, channels.data());
+  for (const cv::Mat& channel : channels) {
+    std::vector<cv::Vec4f> some;
+    detector->detect(channel, some);
+    segments.insert(segments.end(), some.begin(), some.end());
+  }
+  std::vector<Line> lines = join_segments(std::move(segments));
+  for (Line& line : lines) cover(line, gradients, kEdge);
+  return lines;
+}
+
+/// The figure of edges that divides an object best from its background, or else the object's
+/// outline.
+std::array<Point, 4> figure_of(const std::vector<Figure>& figures, const Foreground& object) {
+  constexpr std::size_t kMost = 400;  // of the best figures
+  const auto worth = [&](const Figure& one) { return one.score + object.divided(one.corners); };
+  const Figure* best = nullptr;
+  for (std::size_t i = 0; i < std::min(kMost, figures.size()); ++i) {
+    if (best == nullptr || worth(figures[i]) > worth(*best)) best = &figures[i];
+  }
+  const bool good = best != nullptr && object.divided(best->corners) > 0;
+  return good ? best->corners : object.corners();
+}
+
+/// Takes the corners where they are sharper and divide the object better than those found before.
+void keep_better(const Gradients& gradients, const Foreground& object,
+                 const std::array<Point, 4>& corners, std::array<Point, 4>& best,
+                 FoundCorners& found) {
+  const double sharpness = least_sharp(gradients, corners);
+  const double divided = object.divided(corners);
+  if (sharpness + divided <= found.sharpness + found.divided + kBetter) return;
+  best = corners;
+  found.sharpness = sharpness;
+  found.divided = divided;
+}
+
 Result<FoundCorners> search(const RgbaImage& photo) {
   const cv::Mat rgba(static_cast<int>(photo.height), static_cast<int>(photo.width), CV_8UC4,
                      const_cast<std::uint8_t*>(photo.pixels.data()));
@@ -488,36 +724,55 @@ Result<FoundCorners> search(const RgbaImage& photo) {
   const double scale = std::max(1.0, std::max(rgb.cols, rgb.rows) / kSearchSide);
   cv::Mat small;
   cv::resize(rgb, small, cv::Size(), 1 / scale, 1 / scale, cv::INTER_AREA);
-  std::vector<cv::Vec4f> segments;
-  const auto detector = cv::createLineSegmentDetector(cv::LSD_REFINE_STD);
-  std::array<cv::Mat, 3> channels;
-  cv::split(small, channels.data());
-  for (const cv::Mat& channel : channels) {
-    std::vector<cv::Vec4f> some;
-    detector->detect(channel, some);
-    segments.insert(segments.end(), some.begin(), some.end());
-  }
   const Gradients gradients(small);
-  std::vector<Line> lines = join_segments(std::move(segments));
-  for (Line& line : lines) cover(line, gradients, kEdge);
-  std::vector<Figure> figures = Search(small, std::move(lines)).figures();
-  if (figures.empty() || figures.front().support < kLeastSupport) {
-    return not_found("no four-sided figure stands out in the photo");
-  }
-  if (rivalled(figures)) return not_found("several four-sided figures stand out in the photo");
+  const std::vector<Figure> figures = Search(small, lines_of(small, gradients)).figures();
+  const Foreground object(small);
+  const bool seen = !figures.empty() && figures.front().support >= kLeastSupport;
+  const bool several = seen && rivalled(figures);
   FoundCorners found;
-  std::array<Point, 4> corners = outermost(figures).corners;
-  corners = push_out(gradients, refine(gradients, corners, {2.5, 3.0}));
-  corners = refine(gradients, corners, {1.2, 1.2});
-  found.sharpness = least_sharp(gradients, corners);
-  if (found.sharpness < kLeastSharp)
-    return not_found("no four-sided figure stands out sharply in the photo");
+  std::array<Point, 4> corners;
+  if (seen && !several) {
+    const auto outline = refine(gradients, outermost(figures).corners, {2.5, 3.0});
+    keep_better(gradients, object, refine(gradients, push_out(gradients, outline), {1.2, 1.2}),
+                corners, found);
+  }
+  if (object.known()) {
+    for (const auto& start : {figure_of(figures, object), object.corners()}) {
+      const auto outline = settle(gradients, object, refine(gradients, start, {2.5, 3.0}));
+      keep_better(gradients, object, refine(gradients, outline, {2.5, 1.2, 1.2}), corners, found);
+    }
+  }
+  if (found.sharpness < kLeastSharp) {
+    return not_found(several ? "several four-sided figures stand out in the photo"
+                     : seen  ? "no four-sided figure stands out sharply in the photo"
+                             : "no four-sided figure stands out in the photo");
+  }
   found.fills = area_of(corners) > kFilled * small.cols * small.rows;
   found.framed = framed(figures, corners) || (!found.fills && goes_on(gradients, corners));
+  found.rivalled = object.rivalled();
   for (Point& corner : corners) corner = (corner + Point(0.5, 0.5)) * scale - Point(0.5, 0.5);
   corners = refine(Gradients(rgb), corners, {1.2 * scale, 1.2, 1.2});
   for (std::size_t i = 0; i < 4; ++i) found.corners[i] = {corners[i].x, corners[i].y};
   return found;
+}
+
+/// Sides parallel to those of the photo, as in a scan and in no hand-held photo.
+bool is_upright(const std::array<Point, 4>& corners) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Point side = corners[(i + 1) % 4] - corners[i];
+    if (std::min(std::fabs(side.x), std::fabs(side.y)) > kUpright * norm_of(side)) return false;
+  }
+  return true;
+}
+
+/// Of the shapes that cameras have, and as large as they make them.
+bool has_camera_shape(double width, double height) {
+  constexpr double kLeastPixels = 640;
+  constexpr double kShapes[] = {4.0 / 3, 3.0 / 2, 16.0 / 9};
+  const double shape = std::max(width, height) / std::min(width, height);
+  return std::max(width, height) >= kLeastPixels && std::ranges::any_of(kShapes, [&](double one) {
+           return std::fabs(shape / one - 1) < 0.005;
+         });
 }
 
 }  // namespace
@@ -528,6 +783,38 @@ Result<FoundCorners> find_corners(const RgbaImage& photo) {
   } catch (const std::exception& thrown) {
     return fail(ExitCode::kInternal, "rectify.opencv", "", thrown.what(), "report this as a bug");
   }
+}
+
+FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found) {
+  const double width = photo.image.width;
+  const double height = photo.image.height;
+  FoundPicture picture;
+  picture.doubt = photo.focal_px > 0 || has_camera_shape(width, height) ? "not-found" : "";
+  if (!found) return picture;
+  std::array<Point, 4> corners;
+  for (std::size_t i = 0; i < 4; ++i) corners[i] = {found->corners[i].x, found->corners[i].y};
+  const double share = area_of(corners) / (width * height);
+  RectifyOptions cut;
+  cut.corners = found->corners;
+  const bool unsharp = found->sharpness < kDoubtfulSharpness && !found->clear();
+  const bool part = share < (unsharp ? kLeastShare : kLeastPicture) || !cut.validate();
+  if (part) return picture;
+  picture.doubt = "";
+  if (found->fills || (share > kLeastFrontal && is_upright(corners))) return picture;
+  picture.doubt = found->doubt();
+  picture.corners = found->corners;
+  for (PixelPoint& corner : *picture.corners) {
+    corner = {std::round(100 * corner.x) / 100, std::round(100 * corner.y) / 100};
+  }
+  return picture;
+}
+
+std::string_view doubt_words(std::string_view doubt) {
+  if (doubt == "rivalled") return "there are several flat objects in the photo";
+  return doubt == "blurred"  ? "an edge is hidden or blurred"
+         : doubt == "framed" ? "there are edges around or beyond them, perhaps those of the sheet"
+         : doubt == "fills"  ? "they fill the photo, which may already be the picture"
+                             : "no edges of a flat object stand out";
 }
 
 Result<RgbaImage> corners_picture(const RgbaImage& photo,

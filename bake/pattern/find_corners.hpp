@@ -1,7 +1,9 @@
-// Where a flat, four-sided thing lies in a photo.
+// The place of a flat, four-sided object in a photo.
 #pragma once
 
 #include <array>
+#include <optional>
+#include <string_view>
 
 #include "bake/image/image.hpp"
 #include "bake/pattern/rectify.hpp"
@@ -11,24 +13,55 @@ namespace modar {
 
 /// Most rendered photos that came out wrong were below it (see find_corners.cpp).
 inline constexpr double kDoubtfulSharpness = 0.92;
+/// Of sides that divide an object from its background, and of their sharpness then.
+inline constexpr double kClear = 0.8;
+inline constexpr double kClearEdge = 0.85;
+/// Of sides that divide an object from a background with edges around it.
+inline constexpr double kClearFramed = 0.95;
+/// Of sides that the background tells nothing of: below, they may be a shadow's.
+inline constexpr double kSureAlone = 0.98;
 
 struct FoundCorners {
   std::array<PixelPoint, 4> corners{};  ///< top-left, top-right, bottom-right, bottom-left
   /// Share of the weakest side where the edge is sharp, 0 to 1; below kDoubtfulSharpness the figure
-  /// may be another thing's, or a corner is hidden.
+  /// may be another object's, or a corner is hidden.
   double sharpness = 0;
-  bool framed = false;  ///< another figure lies around it, or two of its edges go on: it may be a
+  /// Share of the weakest side on which the foreground ends, 0 to 1.
+  double divided = 0;
+  bool rivalled = false;  ///< another object of its size has contrast
+  bool framed = false;  ///< another figure surrounds it, or two of its edges continue: it may be a
                         ///< part of that
   bool fills = false;   ///< nearly all of the photo, which may be the picture itself
+  /// Whether the corners are those of the foreground: then edges around it are
+  /// the background's.
+  [[nodiscard]] bool clear() const { return divided >= kClear && sharpness >= kClearEdge; }
+  /// Why they may be wrong: "blurred", "framed", "rivalled" or "fills"; empty: they are sure.
+  [[nodiscard]] const char* doubt() const {
+    if (clear() && rivalled) return "rivalled";
+    const double least = divided > 0 ? kDoubtfulSharpness : kSureAlone;
+    if (!clear() && sharpness < least) return "blurred";
+    if (framed && !(clear() && divided >= kClearFramed)) return "framed";
+    return fills ? "fills" : "";
+  }
 };
 
 /// The largest four-sided figure whose sides stand out all along: straight segments (LSD: von Gioi,
 /// Jakubowicz, Morel and Randall, "LSD: a line segment detector", IPOL 2012) are joined to lines,
 /// lines to figures, and the best one's sides are fitted to the photo's edges to sub-pixels, those
-/// of the thing rather than of a frame printed on it. Which corner is the thing's own top-left
+/// of the object rather than of a frame printed on it. Which corner is the object's own top-left
 /// nobody can tell: it is taken to be upright. Errors: kInvalidInput "rectify.not-found", where no
 /// figure stands out sharply or two do.
 Result<FoundCorners> find_corners(const RgbaImage& photo);
+
+/// The picture of a pattern in its file.
+struct FoundPicture {
+  /// To 0.01 pixels, see FoundCorners; nothing: the file is the picture.
+  std::optional<std::array<PixelPoint, 4>> corners;
+  const char* doubt = "";  ///< why that may be wrong, as above, or "not-found"; empty: it is sure
+};
+FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found);
+/// The doubt in words for a message: "an edge is hidden or blurred".
+std::string_view doubt_words(std::string_view doubt);
 
 /// The photo, at most 1,200 pixels wide, with the figure and its corners' numbers drawn on it.
 Result<RgbaImage> corners_picture(const RgbaImage& photo, const std::array<PixelPoint, 4>& corners);

@@ -16,8 +16,8 @@
 namespace modar {
 namespace {
 
-// Pixels. The patterns of the ModAR paper are 245 to 717 on a side. A larger picture only moves the
-// scales at which features are found away from those at which a 1280x720 camera sees the pattern.
+// Pixels of a side. A larger picture only moves features to scales at which a 1280x720 camera does
+// not see them.
 constexpr int kLargestPattern = 720;
 
 /// Cells across and down: fine enough to see a shadow that falls on a part of a pattern, coarse

@@ -23,7 +23,7 @@ Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk);
 /// in linear light, transparent pixels as white paper.
 std::vector<std::byte> pattern_colours(const RgbaImage& image);
 /// The PNG and JPEG files of a folder sorted by name, or the file itself. Errors: kIo
-/// "pictures.folder" where there is none.
+/// "pictures.folder" if none.
 Result<std::vector<std::string>> pictures_of(const std::string& path);
 /// Replaces each folder in `paths` by its pictures. Errors: those of pictures_of().
 Result<void> open_folders(std::vector<std::string>& paths);

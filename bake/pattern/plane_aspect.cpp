@@ -10,21 +10,19 @@
 namespace modar {
 namespace {
 
-// What is not known, in shares of the photo's longer side: a corner's place (at least a pixel), and
-// where the optical axis meets the picture.
+// Unknown quantities, in shares of the photo's longer side: a corner's place (at least a pixel),
+// and where the optical axis meets the picture.
 constexpr double kCornerSpread = 0.001;
 constexpr double kCentreSpread = 0.01;
-// How much a lens bends: radially, of the cube of the distance from the axis. More makes strong
-// perspective count for less: with 0.1, chessboards seen by a lens of 0.4 are up to 14 % off, with
-// 0.25 5 %; rendered photos of straight lenses are 0.6 % off (median at 30 to 45 degrees) with 0.1,
-// 0.7 % with 0.25.
+// Expected radial bend of a lens, of the cube of the distance from the axis. Higher trusts strong
+// perspective less. [0.1, 0.25]
 constexpr double kBendSpread = 0.25;
 // Focal length where no EXIF tells it: main cameras of phones have 0.7 to 0.82 of the longer side.
 // Spread: of its natural logarithm.
 constexpr double kUsualFocal = 0.8;
 constexpr double kUsualSpread = 0.15;
 constexpr double kExifSpread = 0.03;
-// A share of photos that are none of these: cropped, or of a long lens.
+// A share of photos that are outliers: cropped, or of a long lens.
 constexpr double kOddShare = 0.01;
 constexpr double kOddSpread = 0.7;
 // Focal lengths that are tried, of the longer side.

@@ -1,4 +1,4 @@
-// The shape of a flat, rectangular thing from one photo of it.
+// The shape of a flat, rectangular object from one photo of it.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ struct AspectEstimate {
 };
 
 /// Width over height of the rectangle whose corners (top-left, top-right, bottom-right,
-/// bottom-left) lie there in a photo of that size, and how far that may be off. Each focal length
+/// bottom-left) are there in a photo of that size, and how far that may be off. Each focal length
 /// gives an aspect and says how right the angle at the corners is then (Zhang & He, "Whiteboard
 /// scanning and image enhancement", 2007, Eq. 11 to 20); all are weighed by that angle, given that
 /// corners and principal point are known to some pixels only, and by what photos usually have.

@@ -16,13 +16,12 @@ namespace {
 Result<FeatureContent> paper_features(const GrayImage& image,
                                       const ParameterSetRecord& parameters) {
   MODAR_ASSIGN(auto features, describe_image(image, parameters));
-  MODAR_ASSIGN(auto yml, features_to_yml(features));
   FeatureContent content;
+  content.yml = features_to_yml(features);
   content.set_id = parameters.id;
   content.descriptor_bytes = features.descriptor_bytes;
   content.keypoints = std::move(features.keypoints);
   content.descriptors = std::move(features.descriptors);
-  content.yml = std::move(yml);
   return content;
 }
 
@@ -53,8 +52,8 @@ namespace {
 
 /// Says that pictures of a box's sides were not cut along its edges.
 void report_crops(const std::string& path, const ShapedPicture& shaped, Report& report) {
-  if (!(shaped.mended > 0)) return;
-  const auto tenths = static_cast<int>(std::lround(1000 * shaped.mended));
+  if (!(shaped.corrected > 0)) return;
+  const auto tenths = static_cast<int>(std::lround(1000 * shaped.corrected));
   report.diagnostics.push_back(
       {"pattern.crops",
        shaped.cut_beyond ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo, path, 0,
@@ -62,7 +61,7 @@ void report_crops(const std::string& path, const ShapedPicture& shaped, Report& 
        "by "
        "up to " +
            std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " % of a side" +
-           (shaped.cut_beyond ? ", some lie further off" : ""),
+           (shaped.cut_beyond ? ", some are further off" : ""),
        shaped.cut_beyond ? "cut the pictures again, along the edges of their sides" : ""});
 }
 
@@ -97,11 +96,6 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
     out.features.push_back(std::move(content));
   }
   const std::size_t found = sets.empty() ? 0 : out.features.front().keypoints.size();
-  if (!sets.empty() && found < sets.front().min_matches) {
-    return fail(ExitCode::kInvalidInput, "pattern.no-features", path,
-                "the picture has " + std::to_string(found) + " features, too few to recognise it",
-                "take a larger, sharper picture with more texture");
-  }
   auto record = make_tracker_record(gray, options, surface);
   if (!record) {
     record.error().where = path;

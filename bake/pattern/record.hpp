@@ -36,7 +36,7 @@ struct PatternFeatures {
 
 /// Describes an image file for the tracker, and under the ModAR paper's parameter sets as YML with
 /// its binary twin. width_mm: printed width, 0: what the file states, or what the shape tells. An
-/// image target of 8th Wall brings its own shape. Errors: those of read_image(), shape_section()
+/// image target of 8th Wall states its own shape. Errors: those of read_image(), shape_section()
 /// and make_tracker_record(); kInvalidInput "pattern.no-features" where the first set finds fewer
 /// than its min_matches.
 Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,

@@ -36,7 +36,7 @@ Result<RgbaImage> warp(const RgbaImage& photo, const std::array<PixelPoint, 4>& 
     for (std::size_t i = 0; i < 4; ++i) {
       from[i] = {static_cast<float>(corners[i].x), static_cast<float>(corners[i].y)};
     }
-    // The picture's edges lie half a pixel outside of the outermost pixel centres.
+    // The picture's edges are half a pixel outside the outermost pixel centres.
     const float right = static_cast<float>(large.width) - 0.5f;
     const float bottom = static_cast<float>(large.height) - 0.5f;
     const std::array<cv::Point2f, 4> to = {cv::Point2f{-0.5f, -0.5f}, cv::Point2f{right, -0.5f},

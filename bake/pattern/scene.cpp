@@ -211,7 +211,7 @@ cv::Mat motion_kernel(double length, double angle) {
 
 namespace {
 
-/// A pose of a curved thing that keeps its picture's nearest place in the frame.
+/// A pose of a curved object that keeps its picture's nearest place in the frame.
 Pose draw_surface_pose(const SceneBand& band, const GrayImage& pattern, const Camera& camera,
                        Random& random) {
   const double area = std::exp(random.uniform(std::log(band.area_low), std::log(band.area_high)));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <string_view>
 
 #include <opencv2/imgproc.hpp>
 
@@ -26,8 +27,7 @@ constexpr int kViewMargin = 24;
 // are the same feature: as in the bake, which chooses by them.
 constexpr double kSamePlace = 3;
 constexpr int kSameCode = 64;
-// Cells on a side of the grid that features should cover, for the cause "spread": of the 60
-// features of a good one (the cause "texture"), each holds one or two.
+// Cells on a side of the grid that features should cover, for the cause "spread".
 constexpr int kSpreadGrid = 6;
 // Root of the area, in frame pixels, at which tilts are tried: large enough that the size does not
 // limit them.
@@ -35,11 +35,11 @@ constexpr double kEasySide = 240;
 
 // Views of each step: more make the range finer and slower.
 constexpr int kViewsOfStep = 6;
-// Of sharpness_of(): from where on print is fine, and where it is nothing else. Photos have 0.4 to
-// 1.2, a circuit board 1.2, pages of text with letters of 4 pixels 1.5 and more.
+// Value of sharpness_of() at which print begins to be fine.
 constexpr double kFine = 1.3;
+// Value of sharpness_of() at which all print is fine.
 constexpr double kFinest = 1.9;
-// range_value() at which a score reaches 63 of 100: the grades' limits are 80, 72, 60 and 44 then.
+// Value of range_value() at which a score reaches 63 of 100; the grades' limits follow.
 constexpr double kScoreScale = 8.7;
 // Least range_value() of the grades A to D: of the twelve pictures of the score ten are A, two B.
 constexpr double kGradeLimits[] = {14, 11, 8, 5};
@@ -171,7 +171,7 @@ Matched match_view(const std::vector<ViewLevel>& levels, const TestView& test,
       least = std::min(least, bits[i]);
     }
     if (here > kSameCode) continue;
-    // As the device's matcher does: the second best counts only where it lies elsewhere.
+    // As the device's matcher does: the second best counts only if it is elsewhere.
     if (here * 10 < elsewhere * 9) {
       found.held.push_back(place);
     } else {
@@ -325,7 +325,7 @@ FrameTruth truth_of(const GrayPicture& picture, const AffineView& view) {
   return truth;
 }
 
-/// Replaces half of the pattern, on one of its four sides, by what is behind it.
+/// Replaces half of the pattern, on one of its four sides, by the background.
 void cover_half(const GrayPicture& picture, const AffineView& view, int side,
                 const GrayPicture& behind, GrayPicture& frame) {
   for (int y = 0; y < frame.height; ++y) {
@@ -634,7 +634,7 @@ Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std
       "take a sharper picture: hold still, focus, do not enlarge a small one",
       "make the two sides differ: it is confused with its mirror image",
       "choose larger print: lines this fine blur into gray at arm's length"};
-  // Each cause's scale runs to what good patterns have: set by hand on twelve pictures and on those
+  // Each cause's scale runs to what good patterns have: chosen on twelve pictures and on those
   // with one known fault that the tests make.
   const int values[9] = {share_of(trial.held, 60),
                          share_of(spread_of(levels[0], out.places), 1.0),
@@ -648,7 +648,14 @@ Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std
   constexpr const char* kIds[9] = {"texture", "spread", "contrast", "repetition", "aspect",
                                    "size",    "blur",   "mirror",   "fine"};
   for (std::size_t i = 0; i < 9; ++i) out.causes.push_back(cause(kIds[i], values[i], advices[i]));
-  if (out.grade != 'A') advise(advices, out);
+  if (out.grade != 'A') {
+    advise(advices, out);
+  } else {
+    // The best needs no change; that its mirror image is taken for it is a fact of its own.
+    for (ScoreCause& one : out.causes) {
+      if (std::string_view(one.id) != "mirror") one.advice = "";
+    }
+  }
   return out;
 }
 

@@ -23,7 +23,7 @@ struct ScoreCause {
   /// "texture", "spread", "contrast", "repetition", "aspect", "size", "blur", "mirror", "fine"
   const char* id;
   int value = 0;       ///< 0 to 100, the best
-  const char* advice;  ///< what a person can do; empty where the value is good
+  const char* advice;  ///< what a person can do; empty where the value or the grade is good
 };
 
 /// A corner of the picture, and in how many of the test views it was matched unambiguously.
@@ -73,7 +73,8 @@ int least_score(char grade);
 char grade_of(const ScoreRange& range);
 
 /// "recognised from 13 cm to 1.3 m, to 70 degrees, 90 % right when half covered"; of curved ones
-/// "over 140 degrees around it". width_mm: printed width, 0: unknown, distances are told in widths.
+/// "over 140 degrees around it". width_mm: printed width, 0: unknown, distances are stated in
+/// widths.
 std::string range_sentence(const ScoreRange& range, double width_mm);
 
 /// The picture with its reliable features (green), unreliable ones (orange), and places without any

@@ -22,7 +22,7 @@ std::string rounded(double value) {
   return text.substr(0, text.find('.') + 2);
 }
 
-/// Degrees that the picture covers, from what is told.
+/// Degrees that the picture covers, from the stated dimensions.
 Result<double> arc_of(const ShapeRequest& request, double width_mm) {
   // A ruler laid around a bottle is right to a few percent.
   constexpr double kSlack = 0.05;

@@ -1,4 +1,4 @@
-// What is printed on bottles, cups and boxes: the shape that the user tells, and the section that
+// Prints on bottles, cups and boxes: the shape that the user tells, and the section that
 // holds it.
 #pragma once
 
@@ -27,7 +27,7 @@ struct ShapeRequest {
   /// Of a box: right, back, left, top and bottom, relative to the folder of the pattern's picture,
   /// which is its front; empty: plain.
   std::array<std::string, 5> sides;
-  std::string text;  ///< as it was written: "cylinder,diameter=66mm,arc=120"; empty: nothing was
+  std::string text;  ///< as written: "cylinder,diameter=66mm,arc=120"; empty: nothing was
   /// Of the picture in the photo that the pattern's file is (of a box, its front): top-left,
   /// top-right, bottom-right, bottom-left. Nothing: the file is the picture.
   std::optional<std::array<PixelPoint, 4>> corners = std::nullopt;
@@ -36,8 +36,8 @@ struct ShapeRequest {
 };
 
 /// A pattern's picture in colour: what its corners cut out of the photo, as `modar pattern rectify`
-/// does, or the file as it is. width_mm: of the picture, 0: not told. Errors: those of read_photo()
-/// and rectify().
+/// does, or the unchanged file. width_mm: of the picture, 0: not told. Errors: those of
+/// read_photo() and rectify().
 Result<RgbaImage> read_pattern_picture(const std::string& path, double width_mm,
                                        const ShapeRequest& request);
 
@@ -48,13 +48,13 @@ Result<RgbaImage> read_pattern_picture(const std::string& path, double width_mm,
 Result<std::vector<std::byte>> shape_section(const ShapeRequest& request, int width, int height,
                                              double& width_mm);
 
-/// A pattern's picture as it is tracked, and its shape.
+/// A pattern's picture as the tracker uses it, and its shape.
 struct ShapedPicture {
   GrayPicture picture;
   bool shrunk = false;             ///< see load_pattern()
   std::vector<std::byte> section;  ///< see shape_section()
   double width_mm = 0;
-  double mended = 0;        ///< of a box: see MendedBox
+  double corrected = 0;     ///< of a box: see CorrectedBox
   bool cut_beyond = false;  ///< the same
 };
 
@@ -71,7 +71,7 @@ Result<ShapedPicture> load_shaped(const std::string& path, double width_mm,
 ShapedPicture assemble_box(const std::array<GrayPicture, 6>& pictures,
                            const std::array<double, 3>& box_mm, int longest = 720);
 
-/// The files that the request names beside the pattern's own, as paths.
+/// The files that the request names in addition to the pattern's own, as paths.
 std::vector<std::string> files_of(const std::string& path, const ShapeRequest& request);
 
 /// The surface of a section that shape_section() made, whose bytes outlive it; flat of an empty

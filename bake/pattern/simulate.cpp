@@ -18,8 +18,8 @@ namespace {
 
 using std::numbers::pi;
 
-// Share of right frames from which a value belongs to the working range. A tracker that is right in
-// nine of ten frames shows its model steadily, since it tracks through the tenth.
+// Share of right frames at which a value belongs to the working range. Higher narrows the range to
+// steadier tracking.
 constexpr double kWorks = 0.9;
 constexpr int kMadeBackgrounds = 4;  // where no photos are given
 

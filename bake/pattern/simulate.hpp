@@ -19,7 +19,7 @@ struct SimulateOptions {
   std::vector<std::string> backgrounds;       ///< image files; empty: generated ones
   int views = 10;                             ///< of each value of a band
   double width_mm = 0;                        ///< printed; 0: what the file or the shape states
-  ShapeRequest shape;                         ///< what it is printed on; flat where nothing is told
+  ShapeRequest shape;  ///< what it is printed on; flat where nothing is stated
   std::uint64_t seed = 1;
   unsigned jobs = 1;  ///< threads; the outcome does not depend on it
 };

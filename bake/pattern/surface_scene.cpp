@@ -1,4 +1,4 @@
-// Rays against round things and faces, some for each pixel of the frame.
+// Rays against round objects and faces, some for each pixel of the frame.
 #include "bake/pattern/surface_scene.hpp"
 
 #include <algorithm>
@@ -17,9 +17,9 @@ namespace {
 using std::numbers::pi;
 
 constexpr double kBody = 1.15;  // of a bottle's body to its label, in height
-constexpr double kBare = 96;    // gray of what is not printed
+constexpr double kBare = 96;    // grey of unprinted parts
 
-/// Where a ray meets the thing.
+/// Where a ray meets the print.
 struct SurfaceHit {
   double distance = 0;
   double facing = 0;  ///< cosine between the normal and the ray
@@ -31,9 +31,9 @@ glm::dvec3 vector_of(const float (&v)[3]) {
   return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
 }
 
-class Thing {
+class CurvedPrint {
  public:
-  Thing(const GrayImage& pattern, const PatternSurface& surface)
+  CurvedPrint(const GrayImage& pattern, const PatternSurface& surface)
       : surface_(surface),
         width_(pattern.width),
         height_(pattern.height),
@@ -64,7 +64,7 @@ class Thing {
     }
     return {low, low + glm::dvec2(size.x, 0), low + size, low + glm::dvec2(0, size.y)};
   }
-  /// Its middle, about which it is turned, and how far its nearest part lies before that.
+  /// Its middle, about which it is turned, and the distance of its nearest part before that.
   [[nodiscard]] glm::dvec3 middle() const {
     if (surface_.faces().empty()) return {0, 0, -surface_.radius()};
     glm::dvec3 sum(0);
@@ -122,7 +122,7 @@ class Thing {
       hit.distance = t;
       hit.facing = -glm::dot(normal, ray) / glm::length(ray);
       if (hit.facing <= 0)
-        hit.facing = -hit.facing;  // the inner side of what is open
+        hit.facing = -hit.facing;  // the inner side of an open object
       else
         hit.printed =
             std::fabs(angle) <= surface_.half_arc() && std::fabs(up) <= height_ / longest_;
@@ -178,17 +178,17 @@ double picture_at(const GrayPicture& picture, glm::dvec2 at) {
 
 std::array<glm::dvec2, 4> surface_corners(const GrayImage& pattern, const PatternSurface& surface,
                                           const Camera& camera, const Pose& pose) {
-  const Thing thing(pattern, surface);
-  auto corners = thing.corners();
+  const CurvedPrint print(pattern, surface);
+  auto corners = print.corners();
   for (glm::dvec2& corner : corners) {
-    corner = project(camera, pose.rotation * thing.at(corner) + pose.translation);
+    corner = project(camera, pose.rotation * print.at(corner) + pose.translation);
   }
   return corners;
 }
 
 Pose surface_pose(const GrayImage& pattern, const PatternSurface& surface, const Camera& camera,
                   double around, double above, double roll, double scale, glm::dvec2 sight) {
-  const Thing thing(pattern, surface);
+  const CurvedPrint print(pattern, surface);
   constexpr double kDegree = pi / 180;
   glm::dmat3 frontal(1.0);
   frontal[1][1] = frontal[2][2] = -1.0;
@@ -202,21 +202,21 @@ Pose surface_pose(const GrayImage& pattern, const PatternSurface& surface, const
                   rotation_matrix({above * kDegree, 0, 0}) * frontal *
                   rotation_matrix({0, -around * kDegree, 0});
   const double step = 2.0 / std::max(pattern.width, pattern.height);
-  const double distance = camera.fx * step / scale + thing.depth();
-  pose.translation = distance * ray - pose.rotation * thing.middle();
+  const double distance = camera.fx * step / scale + print.depth();
+  pose.translation = distance * ray - pose.rotation * print.middle();
   return pose;
 }
 
 void draw_surface(const GrayImage& pattern, const PatternSurface& surface, const Camera& camera,
                   const Pose& pose, double covered, GrayPicture& frame) {
-  const Thing thing(pattern, surface);
+  const CurvedPrint print(pattern, surface);
   const auto levels = halved(pattern);
   const glm::dmat3 back = glm::transpose(pose.rotation);
   const glm::dvec3 eye = -(back * pose.translation);
-  const glm::dvec3 middle = pose.rotation * thing.middle() + pose.translation;
+  const glm::dvec3 middle = pose.rotation * print.middle() + pose.translation;
   // Frame pixels of the ball around it; a distorting lens moves its edge by less than a quarter.
-  const double nearest = std::max(middle.z - thing.reach(), 1e-3);
-  const double radius = 1.25 * camera.fx * thing.reach() / nearest + 4;
+  const double nearest = std::max(middle.z - print.reach(), 1e-3);
+  const double radius = 1.25 * camera.fx * print.reach() / nearest + 4;
   const glm::dvec2 centre = project(camera, middle);
   const auto bound = [](double value, int most) {
     return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(most)));
@@ -237,7 +237,7 @@ void draw_surface(const GrayImage& pattern, const PatternSurface& surface, const
         const glm::dvec2 ideal = undistort(camera, at);
         const glm::dvec3 ray = back * glm::dvec3((ideal.x - camera.cx) / camera.fx,
                                                  (ideal.y - camera.cy) / camera.fy, 1.0);
-        const auto hit = thing.meet(eye, ray);
+        const auto hit = print.meet(eye, ray);
         if (!hit) continue;
         ++hits;
         double gray = kBare;

@@ -1,4 +1,4 @@
-// Keys of the JSON files are those of the tools that 8th Wall published for projects of one's own.
+// Keys of the JSON files are those of the tools that 8th Wall published for users' own projects.
 #include "bake/pattern/target_file.hpp"
 
 #include <algorithm>
@@ -30,7 +30,7 @@ Result<Json> read_target(const std::string& path) {
     if (*type->text() == known) return json;
   }
   return fail(ExitCode::kUnsupported, "target.type", path,
-              "its picture is on an unknown kind of thing (" + *type->text() + ")",
+              "its picture is on an unknown kind of object (" + *type->text() + ")",
               "PLANAR, CYLINDER and CONICAL are supported: choose another target");
 }
 
@@ -40,7 +40,7 @@ std::optional<Json> member(const Json& json, const std::string& key) {
   return newer ? newer : json.find("xrMetadata/" + key);
 }
 
-/// Where a target's picture lies, in millimetres.
+/// The place of a target's picture, in millimetres.
 struct CurvedTarget {
   ShapeRequest shape;
   double side_mm = 0;   ///< of the picture, along the axis' direction
@@ -61,7 +61,7 @@ Result<CurvedTarget> read_curved(const Json& json, const std::string& path) {
   for (std::size_t i = 0; i < std::size(kKeys); ++i) {
     const auto value = member(json, kKeys[i]);
     if (!value || !value->number()) {
-      return no_target(path, std::string("it is on a curved thing but has no ") + kKeys[i]);
+      return no_target(path, std::string("it is on a curved object but has no ") + kKeys[i]);
     }
     numbers[i] = *value->number();
   }
@@ -96,7 +96,7 @@ Result<CurvedTarget> read_curved(const Json& json, const std::string& path) {
   return out;
 }
 
-/// The picture with the proportions that it has on the thing: a cone's is stored as wide as its
+/// The picture with the proportions that it has on the object: a cone's is stored as wide as its
 /// wider end.
 GrayPicture in_proportion(const GrayPicture& picture, const CurvedTarget& target) {
   GrayPicture out{picture.width, 0, {}};
@@ -122,13 +122,13 @@ GrayPicture in_proportion(const GrayPicture& picture, const CurvedTarget& target
 }
 
 /// A turn by 90 degrees against the clock, which takes back that of 8th Wall's tools.
-GrayPicture turned_back(const GrayPicture& picture) {
-  GrayPicture out{picture.height, picture.width, {}};
+RgbaImage turned_back(const RgbaImage& picture) {
+  RgbaImage out{picture.height, picture.width, {}};
   out.pixels.reserve(picture.pixels.size());
-  for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x) {
-      const int at = x * picture.width + picture.width - 1 - y;
-      out.pixels.push_back(picture.pixels[static_cast<std::size_t>(at)]);
+  for (std::size_t y = 0; y < out.height; ++y) {
+    for (std::size_t x = 0; x < out.width; ++x) {
+      const std::uint8_t* const from = &picture.pixels[4 * ((x + 1) * picture.width - 1 - y)];
+      out.pixels.insert(out.pixels.end(), from, from + 4);
     }
   }
   return out;
@@ -146,7 +146,7 @@ Result<std::string> target_picture(const std::string& path) {
   for (const char* key : {"resources/croppedImage", "resources/luminanceImage", "imagePath"}) {
     const auto value = json.find(key);
     if (!value || !value->text()) continue;
-    // imagePath is an address on the web: the file itself lies beside the target.
+    // imagePath is an address on the web: the file is next to the target.
     for (const fs::path& name : {fs::path(*value->text()), fs::path(*value->text()).filename()}) {
       const fs::path picture = fs::path(path).parent_path() / name;
       std::error_code failed;
@@ -159,12 +159,18 @@ Result<std::string> target_picture(const std::string& path) {
               "copy them next to it, or pass the picture itself with --pattern");
 }
 
-Result<GrayPicture> load_target(const std::string& path) {
+Result<RgbaImage> read_target_colours(const std::string& path) {
   MODAR_ASSIGN(const std::string file, target_picture(path));
-  MODAR_ASSIGN(GrayPicture picture, load_gray(file));
+  MODAR_ASSIGN(RgbaImage picture, read_image(file));
   MODAR_ASSIGN(const Json json, read_target(path));
   const auto turned = member(json, "isRotated");
-  if (turned && turned->dump().starts_with("true")) picture = turned_back(picture);
+  return turned && turned->dump().starts_with("true") ? turned_back(picture) : std::move(picture);
+}
+
+Result<GrayPicture> load_target(const std::string& path) {
+  MODAR_ASSIGN(const RgbaImage colours, read_target_colours(path));
+  const GrayPicture picture = gray_of(colours);
+  MODAR_ASSIGN(const Json json, read_target(path));
   if (json.find("type")->text() == "PLANAR") return picture;
   MODAR_ASSIGN(const CurvedTarget curved, read_curved(json, path));
   return in_proportion(picture, curved);

@@ -1,4 +1,5 @@
-// Image targets of 8th Wall: a JSON file beside its pictures, as its tools leave them in a project.
+// Image targets of 8th Wall: a JSON file next to its pictures, as its tools leave them in a
+// project.
 #pragma once
 
 #include <string>
@@ -12,7 +13,7 @@ namespace modar {
 /// Whether the file's name ends in .json.
 bool is_target_file(std::string_view path);
 
-/// The picture that a target file names, beside it: the cropped one, else the one whose luminance
+/// The picture that a target file names, next to it: the cropped one, else the one whose luminance
 /// is tracked. Errors: kIo "target.picture" (none is there), "io.open"; kInvalidInput
 /// "target.json"; kUnsupported "target.type".
 Result<std::string> target_picture(const std::string& path);
@@ -21,6 +22,9 @@ Result<std::string> target_picture(const std::string& path);
 /// cylinders and cones with the proportions that it has on them. Errors: those above, and of
 /// read_image().
 Result<GrayPicture> load_target(const std::string& path);
+
+/// The same picture in its colours, with the proportions of the file.
+Result<RgbaImage> read_target_colours(const std::string& path);
 
 /// What the target says of a cylinder or a cone, of the part that the picture shows; flat of type
 /// "PLANAR". Errors: those above.

@@ -62,10 +62,9 @@ void add_shape(const std::vector<std::byte>& shape, BundleContent& content) {
 Result<void> add_features(const GrayImage& pattern, const ParameterSetRecord& set,
                           BundleContent& content) {
   MODAR_ASSIGN(auto features, describe_image(pattern, set));
-  MODAR_ASSIGN(auto yml, features_to_yml(features));
   content.features.back().push_back({set.id, features.descriptor_bytes,
                                      std::move(features.keypoints), std::move(features.descriptors),
-                                     std::move(yml)});
+                                     ""});
   return {};
 }
 
@@ -95,7 +94,7 @@ Result<void> read_picture(const std::string& path, unsigned jobs, std::vector<Na
 
 Result<void> read_bundle(const std::string& path, std::vector<NamedPattern>& out) {
   MODAR_ASSIGN(const auto file, MappedFile::open(path));
-  MODAR_ASSIGN(const auto bundle, BundleView::open(file.bytes()));
+  MODAR_ASSIGN(const auto bundle, file.settle(BundleView::open(file.bytes())));
   for (std::uint32_t i = 0; i < bundle.patterns().size(); ++i) {
     const auto bytes = bundle.section(SectionType::kTrackerRecord, i, 0);
     TrackerRecordView view;
@@ -116,7 +115,7 @@ Result<void> read_bundle(const std::string& path, std::vector<NamedPattern>& out
                                                   {bytes.begin(), bytes.end()}, pattern.shape));
     out.push_back(std::move(pattern));
   }
-  return {};
+  return file.intact();
 }
 
 void keep_sample(const SceneFrame& scene, const GrayPicture& frame, const TrackResult& result,

@@ -95,7 +95,7 @@ class PoseTally {
   std::array<glm::dvec2, 4> last_{};
 };
 
-/// What the views of one trial have in common; what is left open is drawn for each view.
+/// What the views of one trial have in common; values left open are drawn for each view.
 struct TrialSetting {
   SceneBand band;
   std::optional<SceneLight> light;

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <sstream>
 #include <system_error>
 
 extern char** environ;
@@ -69,6 +70,15 @@ ProcessOutcome run_measured(const ProcessRequest& request) {
 
 int run_process(const ProcessRequest& request) {
   return run_measured(request).exit;
+}
+
+bool is_installed(const std::string& program) {
+  const char* value = std::getenv("PATH");
+  std::istringstream folders(value == nullptr ? "" : value);
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    if (::access((folder + "/" + program).c_str(), X_OK) == 0) return true;
+  }
+  return false;
 }
 
 std::string program_folder() {

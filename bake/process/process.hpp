@@ -1,4 +1,5 @@
-// Other programs that a command runs, a folder for what it hands them, and where ModAR's own lie.
+// Other programs that a command runs, a folder for what it hands them, and the places of ModAR's
+// own.
 #pragma once
 
 #include <cstdint>
@@ -40,6 +41,9 @@ ProcessOutcome run_measured(const ProcessRequest& request);
 
 /// Runs it to its end. Answers its exit code, or -1 where it could not be started or was killed.
 int run_process(const ProcessRequest& request);
+
+/// Whether PATH has a program of this name.
+bool is_installed(const std::string& program);
 
 /// Path of the running program's folder: that of all programs of ModAR.
 std::string program_folder();

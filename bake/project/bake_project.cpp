@@ -1,5 +1,4 @@
-// What of a project changed, baked; what it belongs to, linked.
-#include <fnmatch.h>
+// Incremental build: bakes changed assets and relinks the bundles that contain them.
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -47,10 +46,11 @@ struct Input {
 struct Task {
   const ProjectAsset* asset = nullptr;
   std::string tier;
-  Settings settings;               ///< that concern it
-  std::vector<Input> inputs;       ///< its own file first; the others only where they are known
-  std::set<std::string> textures;  ///< pictures beside a model, that are its texture by their names
-  std::string action;              ///< digest of its own file, settings and program
+  Settings settings;          ///< that concern it
+  std::vector<Input> inputs;  ///< its own file first; the others only where they are known
+  std::set<std::string>
+      textures;        ///< pictures next to a model, that are its texture by their names
+  std::string action;  ///< digest of its own file, settings and program
   std::optional<std::string> key;  ///< digest of all inputs; nothing: they are not known yet
   AssetOutcome::State state = AssetOutcome::State::kFresh;
   std::string reason;
@@ -83,12 +83,6 @@ std::string stamp_of(const std::string& path) {
   if (::stat(path.c_str(), &status) != 0) return "";
   return std::to_string(status.st_size) + " " + std::to_string(status.st_mtim.tv_sec) + "." +
          std::to_string(status.st_mtim.tv_nsec) + " " + std::to_string(status.st_ino);
-}
-
-bool matches(const std::string& name, const std::vector<std::string>& globs) {
-  return std::any_of(globs.begin(), globs.end(), [&](const std::string& glob) {
-    return ::fnmatch(glob.c_str(), name.c_str(), 0) == 0;
-  });
 }
 
 class ProjectBake {
@@ -136,22 +130,14 @@ class ProjectBake {
     const std::string suffix = tier.name.empty() ? "" : "-" + tier.name;
     target.path =
         (fs::path(project_.path(project_.out)) / (bundle.name + suffix + ".modar")).string();
-    const bool all = bundle.models.empty() && bundle.patterns.empty();
-    std::set<std::string> shown;
-    std::set<std::string> patterns;
-    for (const ProjectAsset& pattern : project_.patterns) {
-      if (!all && !matches(pattern.name, bundle.patterns)) continue;
-      target.patterns.push_back(task_of(pattern, tier));
-      patterns.insert(pattern.name);
+    BundleAssets assets = assets_of(project_, bundle);
+    for (const ProjectAsset* pattern : assets.patterns) {
+      target.patterns.push_back(task_of(*pattern, tier));
     }
-    for (const ProjectScene& scene : project_.scenes) {
-      if (patterns.count(scene.request.pattern) == 0) continue;
-      target.scenes.push_back(&scene);
-      shown.insert(scene.request.model);
-    }
-    for (const ProjectAsset& model : project_.models) {
-      if (!all && shown.count(model.name) == 0 && !matches(model.name, bundle.models)) continue;
-      target.models.push_back(task_of(model, tier));
+    for (const ProjectAsset* model : assets.models) target.models.push_back(task_of(*model, tier));
+    target.scenes = std::move(assets.scenes);
+    for (const NeverShown& what : assets.never_shown) {
+      if (options_.only.empty()) notes_.push_back(finding_of(what, target.path));
     }
     targets_.push_back(std::move(target));
   }
@@ -175,8 +161,8 @@ class ProjectBake {
                         });
   }
 
-  /// What the project says of an asset beside its settings: the width and the shape of a pattern,
-  /// what may be a model's texture.
+  /// Statements of the project about an asset, apart from its settings: the width and the shape of
+  /// a pattern, what may be a model's texture.
   [[nodiscard]] std::string traits_of(const ProjectAsset& asset) const {
     if (!asset.pattern) return own_picture(asset) ? "" : "its name is a pattern's";
     return std::to_string(asset.width_mm) +
@@ -199,7 +185,8 @@ class ProjectBake {
                     broken ? std::string(kNoFile) : digests_.of(file)}};
     task.action = digest_of(std::string(task.asset->pattern ? "pattern" : "model") + "\n" +
                             program_ + "\n" + task.inputs[0].path + "\n" + task.inputs[0].digest +
-                            "\n" + traits_of(*task.asset) + "\n" + joined(task.settings));
+                            "\n" + traits_of(*task.asset) + "\n" + joined(task.settings) +
+                            (project_.outside ? "\noutside" : ""));
     if (!task.asset->pattern) task.textures = names_.textures_of(file, own_picture(*task.asset));
     const auto files =
         names_files(*task.asset) ? cache_.files_of(task.action) : std::vector<std::string>();
@@ -383,7 +370,7 @@ class ProjectBake {
     return {};
   }
 
-  /// What is wrong with a scene costs no bake.
+  /// A fault of a scene costs no bake.
   Result<void> check_scenes() const {
     for (const Target& target : targets_) {
       if (target.fresh) continue;
@@ -454,7 +441,7 @@ class ProjectBake {
       task.part = cache_.read(*task.key, name, reason);
       if (!task.part) {
         return fail(ExitCode::kIo, "cache.folder", task.asset->file,
-                    "what was written to the cache cannot be read back", "check the disk");
+                    "an entry written to the cache cannot be read back", "check the disk");
       }
       task.state = AssetOutcome::State::kBaked;
     }
@@ -468,6 +455,7 @@ class ProjectBake {
     MODAR_TRY(apply_settings(task.settings, request));
     request.tool_version = options_.tool_version;
     request.jobs = jobs;
+    if (!project_.outside) request.within = project_.folder.empty() ? "." : project_.folder;
     if (task.asset->pattern) {
       request.patterns = {{file, task.asset->width_mm, task.asset->shape}};
     } else {
@@ -481,11 +469,10 @@ class ProjectBake {
       return fail(ExitCode::kIo, "project.changing", file, "it changed during the bake",
                   "bake again");
     }
-    for (const std::string& named : trace.files) {
+    // Files outside the folder are not read, but searched next to the asset.
+    for (std::string& named : trace.files) {
       if (project_.may_use(named)) continue;
-      return fail(ExitCode::kInvalidInput, "project.outside", file,
-                  "it names " + named + ", which is outside the project's folder",
-                  "copy it into the folder; if you trust the project, bake with --outside");
+      named = (fs::path(file).parent_path() / fs::path(named).filename()).string();
     }
     take_inputs(task, named_files(task, trace.files));
     PartNotes notes;
@@ -518,18 +505,21 @@ class ProjectBake {
   // Linking.
 
   Result<void> link(Target& target) {
+    BakeRequest described;
+    MODAR_TRY(apply_settings(settings_in(target), described));
     std::vector<LinkPart> models;
     std::vector<LinkPart> patterns;
     for (auto [from, to] :
          {std::pair(&target.models, &models), std::pair(&target.patterns, &patterns)}) {
       for (const std::size_t index : *from) {
         const Task& task = tasks_[index];
-        if (!task.part) return {};  // its own error is told
-        to->push_back({task.part->bundle, task.asset->name, task.part->notes.model_sides});
+        if (!task.part) return {};  // its own error is reported
+        // A pattern is baked once for all tiers, those of a device included.
+        const bool keypoints = described.device.empty() || task.settings.contains("parameters");
+        to->push_back(
+            {task.part->bundle, task.asset->name, task.part->notes.model_sides, keypoints});
       }
     }
-    BakeRequest described;
-    MODAR_TRY(apply_settings(settings_in(target), described));
     described.tool_version = options_.tool_version;
     if (!project_.light.empty()) described.light = project_.path(project_.light);
     MODAR_TRY(describe_scenes(target, described));
@@ -540,9 +530,9 @@ class ProjectBake {
     const auto media = [&](const NodeRequest& node) { return media_of(node, target, described); };
     MODAR_ASSIGN(BundleContent content, link_bundles(models, patterns, described, media));
     add_texts(target, content);
+    add_baked_apart(target, content);
     MODAR_TRY(hold_gates(target, content));
     note_budget(target, described, content);
-    note_idle(target);
     for (Diagnostic& alike : alike_patterns(content)) notes_.push_back(std::move(alike));
     return write(target, content);
   }
@@ -603,9 +593,29 @@ class ProjectBake {
       }
       texts.push_back(std::move(entry));
     }
-    if (texts.size() == 0) return;
+    if (texts.size() != 0) add_to_meta("texts", std::move(texts), content);
+  }
+
+  /// States that one bake of all sources by the stated options would give something else: assets
+  /// with settings of their own, and textures that several models share.
+  void add_baked_apart(const Target& target, BundleContent& content) const {
+    bool apart = false;
+    std::set<std::string_view> textures;
+    for (const auto* indices : {&target.models, &target.patterns}) {
+      for (const std::size_t index : *indices) {
+        const Task& task = tasks_[index];
+        apart |= !task.asset->settings.empty();
+        for (const TextureRecord& texture : task.part->bundle.textures()) {
+          apart |= !textures.insert(task.part->bundle.name(texture.name)).second;
+        }
+      }
+    }
+    if (apart) add_to_meta("baked_apart", true, content);
+  }
+
+  static void add_to_meta(const char* key, Json value, BundleContent& content) {
     Json meta = Json::parse(content.meta);
-    meta.set("texts", std::move(texts));
+    meta.set(key, std::move(value));
     content.meta = meta.dump();
     content.summary = content_summary_of(content);  // it states the meta's hash
   }
@@ -633,7 +643,7 @@ class ProjectBake {
         return fail(ExitCode::kInvalidInput, "project.gate", target.path,
                     content.names.substr(pattern.name.offset, pattern.name.length) +
                         ": its grade is below " + gates.min_grade + ", which [gates] asks for",
-                    "take a better picture (`modar pattern score` says what is wrong with it), or "
+                    "take a better picture (`modar pattern score` reports its faults), or "
                     "lower the gate; the bundle is not written");
       }
     }
@@ -650,31 +660,6 @@ class ProjectBake {
                           described.device + " should give " +
                           human_bytes(described.texture_budget) + " at most",
                       "lower max-texture, or make several bundles"});
-  }
-
-  /// Says which models stand on no pattern, and on which patterns nothing stands.
-  void note_idle(const Target& target) {
-    if (target.models.empty() || target.patterns.empty()) return;
-    std::set<std::string> used;  // "\np" behind patterns, "\nm" behind models
-    for (const ProjectScene* scene : target.scenes) {
-      used.insert({scene->request.pattern + "\np", scene->request.model + "\nm"});
-    }
-    for (const bool pattern : {false, true}) {
-      constexpr std::size_t kMostNames = 6;
-      std::size_t count = 0;
-      std::string idle;
-      for (const std::size_t index : pattern ? target.patterns : target.models) {
-        const std::string& name = tasks_[index].asset->name;
-        if (used.count(name + (pattern ? "\np" : "\nm")) != 0) continue;
-        if (++count <= kMostNames) idle += (idle.empty() ? "" : ", ") + name;
-      }
-      if (count == 0) continue;
-      if (count > kMostNames) idle += " and " + std::to_string(count - kMostNames) + " more";
-      notes_.push_back({"project.never-shown", DiagnosticSeverity::kWarning, target.path, 0,
-                        pattern ? "nothing stands on the patterns " + idle
-                                : "no pattern shows the models " + idle,
-                        "write a [[scene]] with pattern and model for each, or leave them out"});
-    }
   }
 
   Result<void> write(Target& target, const BundleContent& content) {

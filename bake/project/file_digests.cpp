@@ -57,6 +57,7 @@ std::string FileDigests::of(const std::string& path) {
     if (!file) return kNoFile;
     look.digest =
         digest_of({reinterpret_cast<const char*>(file->bytes().data()), file->bytes().size()});
+    look.settled = look.settled && file->intact();
   }
   const std::lock_guard lock(mutex_);
   learnt_ = learnt_ || look.settled;

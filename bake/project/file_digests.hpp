@@ -23,11 +23,11 @@ class FileDigests {
   /// Of the file at `path`, kNoFile where it cannot be read. May be called by several threads.
   std::string of(const std::string& path);
 
-  /// What is known, for the next run: an array of [path, size, time, inode, digest]. Paths that
+  /// The known digests, for the next run: an array of [path, size, time, inode, digest]. Paths that
   /// begin with `folder` stand without it, so that a run from elsewhere knows them.
   [[nodiscard]] Json json(const std::string& folder) const;
   void read(const Json& json, const std::string& folder);
-  /// A file was read that json() tells of and read() did not.
+  /// True if a digest was computed that was not in the cache.
   [[nodiscard]] bool learnt() const { return learnt_; }
 
  private:

@@ -1,4 +1,4 @@
-// What lies beside an asset under names that the asset does not state letter by letter.
+// Files next to an asset under names that the asset does not state exactly.
 #pragma once
 
 #include <map>
@@ -12,18 +12,18 @@ namespace modar {
 /// several threads.
 class FolderNames {
  public:
-  /// Path of the file that `name`, relative to `folder`, refers to: where there is none, of the one
-  /// that find_named_file() takes instead; where there is none either, as it is stated.
+  /// Path of the file that `name`, relative to `folder`, refers to: if none exists, of the one that
+  /// find_named_file() takes instead; else unchanged.
   std::string located(const std::string& folder, const std::string& name);
 
-  /// Names of pictures beside a model file that may be its texture by their name:
+  /// Names of pictures next to a model file that may be its texture by their name:
   /// is_texture_name(), and with own_picture is_own_picture().
   std::set<std::string> textures_of(const std::string& model, bool own_picture);
 
  private:
   struct Names {
     std::set<std::string> lower;     ///< of all, in small letters
-    std::set<std::string> pictures;  ///< as they are
+    std::set<std::string> pictures;  ///< unchanged
   };
   const Names& names_in(const std::string& folder);
 

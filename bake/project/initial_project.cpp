@@ -1,4 +1,4 @@
-// Writes the first modar.toml from what lies in a folder.
+// Writes the first modar.toml from the files of a folder.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -7,32 +7,26 @@
 #include <optional>
 #include <set>
 
-#include "bake/image/image.hpp"
-#include "bake/import/read_model.hpp"
-#include "bake/io/input.hpp"
+#include "bake/bundle/files/sorted_files.hpp"
+#include "bake/import/source_model.hpp"
 #include "bake/mesh/upright.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/options/options.hpp"
 #include "bake/process/process.hpp"
 #include "bake/project/project.hpp"
-#include "formats/base/utf8.hpp"
+#include "formats/base/path.hpp"
+#include "formats/base/shortest_number.hpp"
 
 namespace modar {
 namespace {
 
 namespace fs = std::filesystem;
 
-bool one_of(const std::string& extension, std::initializer_list<const char*> list) {
-  return std::any_of(list.begin(), list.end(), [&](const char* one) { return extension == one; });
-}
-
 struct Found {
   std::string folder;
-  std::vector<fs::path> left_out;  ///< what looks like a model or a picture and is not read
-  std::vector<fs::path> models;    ///< relative to the folder, in byte order
-  std::vector<fs::path> pictures;  ///< the same
-  std::vector<fs::path> textures;  ///< pictures that are no patterns; the same
-  std::string material_text;       ///< of all MTL and glTF files, in lower case
+  SortedFiles files;                     ///< relative to the folder, in byte order
+  std::vector<PatternRequest> pictures;  ///< of the files, each with the corners found in it
+  std::vector<Diagnostic> said;          ///< of the pictures
 };
 
 /// Hidden folders, and the one that the bundles go to, are left out.
@@ -40,71 +34,13 @@ bool left_out(const fs::path& name) {
   return name.string().starts_with('.') || name == "out";
 }
 
-/// A larger one embeds its pictures, and names none. What it would name becomes a pattern too many.
-constexpr std::size_t kMostMaterialBytes = std::size_t{64} << 20;
-
-std::string text_of(const fs::path& path) {
-  return ascii_lower(read_file(path.string(), kMostMaterialBytes).value_or(""));
-}
-
-/// A file's name as glTF writes it, in small letters as the text that is searched for it.
-std::string as_uri(const std::string& file) {
-  std::string uri;
-  for (const char c : file) {
-    const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') ||
-                       std::string_view("-._~").find(c) != std::string_view::npos;
-    char escaped[4];
-    std::snprintf(escaped, sizeof escaped, "%%%02x", static_cast<unsigned char>(c));
-    uri += plain ? std::string(1, c) : escaped;
-  }
-  return uri;
-}
-
-/// Does a text name a file? "wall1.png" does not name "1.png".
-bool names_file(const std::string& text, const std::string& file) {
-  for (std::size_t at = text.find(file); at != std::string::npos; at = text.find(file, at + 1)) {
-    if (at == 0 || std::string_view(" \t\"'/\\").find(text[at - 1]) != std::string_view::npos) {
-      return true;
-    }
-  }
-  return false;
-}
-
-/// Files above it are not read to see what they hold.
-constexpr std::uintmax_t kMostModelBytes = 100'000'000;  // a second of reading
-
-std::optional<SourceModel> small_model(const fs::path& path) {
-  std::error_code error;
-  if (fs::file_size(path, error) > kMostModelBytes || error) return std::nullopt;
-  auto source = read_model(path.string(), {});
-  return source ? std::optional(std::move(*source)) : std::nullopt;
-}
-
-/// Is a picture a texture: one that a material names, or that is a model's by its name?
-bool is_texture(const fs::path& picture, const Found& found) {
-  const std::string name = ascii_lower(picture.filename().string());
-  if (names_file(found.material_text, name)) return true;
-  if (names_file(found.material_text, as_uri(name))) return true;
-  const std::string stem = picture.stem().string();
-  return std::any_of(found.models.begin(), found.models.end(), [&](const fs::path& model) {
-    if (model.parent_path() != picture.parent_path()) return false;
-    if (is_map_name(stem, model.stem().string())) return true;
-    if (!is_own_picture(stem, model.stem().string())) return false;
-    const auto source = small_model(fs::path(found.folder) / model);
-    return source && std::ranges::any_of(source->materials, [&](const SourceMaterial& material) {
-             return fs::path(material.diffuse_map).filename() == picture.filename();
-           });
-  });
-}
-
-Result<Found> look_through(const std::string& folder) {
-  Found found;
-  found.folder = folder;
+Result<std::vector<std::string>> files_below(const std::string& folder) {
+  std::vector<std::string> files;
   std::error_code error;
   fs::recursive_directory_iterator it(folder, error);
   if (error) {
-    return fail(ExitCode::kIo, "io.folder", folder, error.message(),
-                "name a folder to look through");
+    return missing_file(folder, {ExitCode::kIo, "io.folder", folder, error.message(),
+                                 "name a folder to look through"});
   }
   for (; it != fs::recursive_directory_iterator(); it.increment(error)) {
     if (error) break;
@@ -112,35 +48,18 @@ Result<Found> look_through(const std::string& folder) {
       if (it->is_directory(error)) it.disable_recursion_pending();
       continue;
     }
-    if (!it->is_regular_file(error)) continue;
-    const fs::path relative = it->path().lexically_relative(folder);
-    const std::string extension = ascii_lower(relative.extension().string());
-    if (is_model_file(relative.string())) found.models.push_back(relative);
-    if (is_foreign_picture_file(relative.string()) ||
-        one_of(extension, {".fbx", ".dae", ".blend", ".3ds", ".usdz", ".usd", ".max", ".c4d", ".ma",
-                           ".mb", ".skp", ".stp", ".step", ".las", ".e57"})) {
-      found.left_out.push_back(relative);
-    }
-    if (is_picture_file(relative.string())) found.pictures.push_back(relative);
-    if (one_of(extension, {".mtl", ".gltf"})) found.material_text += text_of(it->path()) + "\n";
+    if (it->is_regular_file(error)) files.push_back(it->path().lexically_relative(folder).string());
   }
-  std::sort(found.models.begin(), found.models.end());
-  std::sort(found.pictures.begin(), found.pictures.end());
-  std::sort(found.left_out.begin(), found.left_out.end());
-  const auto patterns =
-      std::stable_partition(found.pictures.begin(), found.pictures.end(),
-                            [&](const fs::path& picture) { return !is_texture(picture, found); });
-  found.textures.assign(patterns, found.pictures.end());
-  found.pictures.erase(patterns, found.pictures.end());
-  return found;
+  std::sort(files.begin(), files.end());
+  return files;
 }
 
-/// "; left out: a.fbx, b.pdf", or nothing.
-std::string list_of(const char* what, const std::vector<fs::path>& files) {
+/// "a.png, b.png and 3 more".
+std::string listed(const std::vector<std::string>& files) {
   constexpr std::size_t kMostNames = 6;
   std::string words;
   for (std::size_t i = 0; i < std::min(kMostNames, files.size()); ++i) {
-    words += (i == 0 ? what : ", ") + files[i].string();
+    words += (i == 0 ? "" : ", ") + files[i];
   }
   if (files.size() > kMostNames) {
     words += " and " + std::to_string(files.size() - kMostNames) + " more";
@@ -148,12 +67,41 @@ std::string list_of(const char* what, const std::vector<fs::path>& files) {
   return words;
 }
 
-std::string left_out_words(const Found& found) {
-  return list_of("; textures, so no patterns: ", found.textures) +
-         list_of("; left out, since such files are not read: ", found.left_out);
+/// Files that could not be baked are left out, so that the project bakes without edits.
+Result<Found> look_through(const std::string& folder) {
+  Found found;
+  found.folder = folder;
+  MODAR_ASSIGN(const std::vector<std::string> files, files_below(folder));
+  found.files = sort_files(files, folder);
+  auto& left_out = found.files.left_out;
+  std::erase_if(found.files.models, [&](const std::string& model) {
+    const auto read = small_model((fs::path(folder) / model).string(), folder);
+    if (!read || *read) return false;
+    left_out.push_back({model, read->error()});
+    return true;
+  });
+  for (const std::string& picture : found.files.pictures) {
+    PatternRequest pattern{(fs::path(folder) / picture).lexically_normal().string()};
+    const auto good = find_picture(pattern, found.said);
+    pattern.path = picture;
+    if (good) {
+      found.pictures.push_back(std::move(pattern));
+    } else {
+      left_out.push_back({picture, good.error()});
+    }
+  }
+  if (!found.files.textures.empty()) {
+    found.said.push_back({"project.textures", DiagnosticSeverity::kInfo, folder, 0,
+                          "textures, so no patterns: " + listed(found.files.textures), ""});
+  }
+  for (const LeftOut& one : left_out) {
+    found.said.push_back({one.error.code, DiagnosticSeverity::kWarning, one.error.where, 0,
+                          "left out: " + one.error.cause, one.error.cure});
+  }
+  return found;
 }
 
-/// A TOML text in quotes, of a file name that a glob matches as it is.
+/// A TOML text in quotes, of a file name that a glob matches literally.
 std::string quoted(const std::string& text, bool glob) {
   std::string out = "\"";
   for (const char c : glob ? as_glob(text) : text) {
@@ -180,7 +128,7 @@ std::string glob_around(const fs::path& file) {
          file.extension().string();
 }
 
-/// The value of "file": a glob, and what it would match that is none of these assets.
+/// The value of "file": a glob, and the files outside these assets that it would match.
 std::string glob_without(const std::string& glob, const std::vector<fs::path>& others) {
   std::string list;
   for (const fs::path& other : others) {
@@ -191,30 +139,42 @@ std::string glob_without(const std::string& glob, const std::vector<fs::path>& o
   return list.empty() ? "\"" + glob + "\"" : "[\"" + glob + "\"" + list + "]";
 }
 
+/// "corners = [[x, y], ...]": where the picture is in the photo.
+std::string corners_line(const std::array<PixelPoint, 4>& corners) {
+  std::string list;
+  for (const PixelPoint& corner : corners) {
+    list += (list.empty() ? "[" : ", [") + shortest_text(corner.x) + ", " +
+            shortest_text(corner.y) + "]";
+  }
+  return "corners = [" + list + "]   # of the picture in this photo; `modar studio` shows them\n";
+}
+
 /// "[[model]]" tables of the files: one glob a folder and extension where all names differ, else a
-/// table a file. others: files that are none of them. names: receives what scenes call them.
-std::string tables(const std::string& kind, const std::vector<fs::path>& files,
+/// table a file. others: files that are not among them. names: receives what scenes call them.
+std::string tables(const std::string& kind, const std::vector<PatternRequest>& files,
                    const std::vector<fs::path>& others, const std::string& comment,
                    std::vector<std::string>& names) {
   std::map<std::string, int> stems;
-  for (const fs::path& file : files) ++stems[file.stem().string()];
-  std::map<std::string, std::vector<fs::path>> groups;  // by glob
-  for (const fs::path& file : files) groups[glob_around(file)].push_back(file);
+  for (const PatternRequest& file : files) ++stems[file_stem(file.path)];
+  std::map<std::string, std::vector<PatternRequest>> groups;  // by glob
+  for (const PatternRequest& file : files) groups[glob_around(file.path)].push_back(file);
   std::string text;
   std::set<std::string> taken;
   for (const auto& [glob, group] : groups) {
-    const bool plain = std::ranges::all_of(
-        group, [&](const fs::path& file) { return stems[file.stem().string()] == 1; });
+    const bool plain = std::ranges::all_of(group, [&](const PatternRequest& file) {
+      return stems[file_stem(file.path)] == 1 && !file.shape.corners;
+    });
     if (plain && group.size() > 1) {
       text += "[[" + kind + "]]\nfile = " + glob_without(glob, others) + comment + "\n\n";
-      for (const fs::path& file : group) taken.insert(file.stem().string());
+      for (const PatternRequest& file : group) taken.insert(file_stem(file.path));
       continue;
     }
-    for (const fs::path& file : group) {
-      std::string name = file.stem().string();
-      text += "[[" + kind + "]]\nfile = " + quoted(file.string(), true) + "\n";
+    for (const PatternRequest& file : group) {
+      std::string name = file_stem(file.path);
+      text += "[[" + kind + "]]\nfile = " + quoted(file.path, true) + "\n";
+      if (file.shape.corners) text += corners_line(*file.shape.corners);
       if (!taken.insert(name).second) {
-        name = folder_or_path(file, taken);
+        name = folder_or_path(file.path, taken);
         taken.insert(name);
         text += "name = " + quoted(name, false) + "\n";
       }
@@ -232,24 +192,25 @@ constexpr const char* kSceneHints =
     "#text.en = \"A vase.\"\n";
 
 /// How a model would stand: "y", and how that is known. Large files are not read for it.
-std::optional<Upright> upright_of(const fs::path& path) {
-  auto source = small_model(path);
-  if (!source) return std::nullopt;
-  if (source->up.reason != UpReason::kConvention) return source->up;
+std::optional<Upright> upright_of(const fs::path& path, const std::string& within) {
+  auto source = small_model(path.string(), within);
+  if (!source || !*source) return std::nullopt;
+  if ((*source)->up.reason != UpReason::kConvention) return (*source)->up;
   Report report;
-  const auto mesh = weld(std::move(*source), report);
+  const auto mesh = weld(std::move(**source), report);
   return mesh ? std::optional(find_up(*mesh)) : std::nullopt;
 }
 
 /// "up = "y"   # the glTF standard", so that one sees what to change.
 std::string up_line(const Found& found, const std::string& model) {
-  const auto file = std::ranges::find_if(found.models, [&](const fs::path& one) {
+  const auto& models = found.files.models;
+  const auto file = std::ranges::find_if(models, [&](const fs::path& one) {
     std::string name = one.string();
     std::replace(name.begin(), name.end(), '/', '-');
     return one.stem() == model || one.parent_path().filename() == model || name == model;
   });
-  const auto up =
-      file == found.models.end() ? std::nullopt : upright_of(fs::path(found.folder) / *file);
+  const auto up = file == models.end() ? std::nullopt
+                                       : upright_of(fs::path(found.folder) / *file, found.folder);
   if (!up) return "#up = \"y\"\n";
   return "up = \"" + std::string(up_axis_name(up->axis)) +
          "\"        # axis that points up: " + std::string(up_reason_words(up->reason)) + "\n";
@@ -260,34 +221,57 @@ std::string suggestions() {
   constexpr std::string_view kOften[] = {"device", "effort", "unit", "max-error", "up"};
   std::string text;
   for (const BakeOption& option : bake_options()) {
-    if (std::find(std::begin(kOften), std::end(kOften), option.key) == std::end(kOften)) continue;
-    std::string line = "#" + std::string(option.key) + " = " + quoted(option.example, false);
+    if (std::find(std::begin(kOften), std::end(kOften), option.name) == std::end(kOften)) continue;
+    std::string line = "#" + std::string(option.name) + " = " + quoted(option.example, false);
     line.resize(std::max<std::size_t>(line.size(), 26), ' ');
     text += line + "# " + option_summary(option) + "\n";
   }
   return text;
 }
 
-/// Pairs in order, where names do not say what belongs together.
-std::string scenes(const Found& found, const std::vector<std::string>& models,
+/// What a person should know of the pairs: that they are a guess, and what stands nowhere.
+void report_pairs(const ScenePairs& pairs, const std::vector<std::string>& models, Found& found) {
+  std::vector<std::string> guesses;
+  std::vector<std::string> idle = models;
+  for (const SceneRequest& scene : pairs.scenes) {
+    if (pairs.guessed) guesses.push_back(scene.model + " on " + scene.pattern);
+    std::erase(idle, scene.model);
+  }
+  if (!guesses.empty()) {
+    found.said.push_back({"project.guessed", DiagnosticSeverity::kWarning, found.folder, 0,
+                          "models were put on pictures in the order of their names, which is a "
+                          "guess: " +
+                              listed(guesses),
+                          "change pattern = and model = in [[scene]], or give a model the name of "
+                          "its picture"});
+  }
+  if (!idle.empty()) {
+    found.said.push_back({"project.idle", DiagnosticSeverity::kWarning, found.folder, 0,
+                          "no picture is left for: " + listed(idle),
+                          "add a [[scene]] for each, or more pictures"});
+  }
+}
+
+/// The scenes that names do not say by themselves.
+std::string scenes(Found& found, const std::vector<std::string>& models,
                    const std::vector<std::string>& patterns) {
   if (models.empty() || patterns.empty()) return "";
-  const bool by_name = std::any_of(models.begin(), models.end(), [&](const std::string& name) {
-    return std::find(patterns.begin(), patterns.end(), name) != patterns.end();
-  });
+  const ScenePairs pairs = pair_by_names(patterns, models);
+  report_pairs(pairs, models, found);
   std::string text =
-      "# Which model stands on which pattern. Without any [[scene]], models stand on patterns of "
+      "# Which model is on which pattern. Without any [[scene]], models are on patterns of "
       "their\n"
       "# own name, and a single one on a single one.\n";
-  if (by_name || (models.size() == 1 && patterns.size() == 1)) {
+  if (!pairs.guessed) {
     return text + "#[[scene]]\n#pattern = " + quoted(patterns[0], false) +
            "\n#model = " + quoted(models[0], false) + "\n#" + up_line(found, models[0]) +
            kSceneHints + "\n";
   }
-  for (std::size_t i = 0; i < std::min(models.size(), patterns.size()); ++i) {
-    text += "[[scene]]\npattern = " + quoted(patterns[i], false) +
-            "\nmodel = " + quoted(models[i], false) + "\n" + up_line(found, models[i]) +
-            (i == 0 ? kSceneHints : "") + "\n";
+  text += "# These pairs are in the order of the names, which is a guess.\n";
+  for (const SceneRequest& scene : pairs.scenes) {
+    text += "[[scene]]\npattern = " + quoted(scene.pattern, false) +
+            "\nmodel = " + quoted(scene.model, false) + "\n" + up_line(found, scene.model) +
+            (&scene == pairs.scenes.data() ? kSceneHints : "") + "\n";
   }
   return text;
 }
@@ -295,13 +279,10 @@ std::string scenes(const Found& found, const std::vector<std::string>& models,
 }  // namespace
 
 Result<FoundAssets> find_assets(const std::string& folder) {
-  MODAR_ASSIGN(const Found found, look_through(folder));
-  FoundAssets assets;
-  for (const fs::path& model : found.models) assets.models.push_back(model.string());
-  for (const fs::path& picture : found.pictures) assets.pictures.push_back(picture.string());
-  std::sort(assets.models.begin(), assets.models.end());
-  std::sort(assets.pictures.begin(), assets.pictures.end());
-  return assets;
+  MODAR_ASSIGN(const std::vector<std::string> files, files_below(folder));
+  SortedFiles sorted = sort_files(files, folder);
+  return FoundAssets{std::move(sorted.models), std::move(sorted.pictures),
+                     std::move(sorted.left_out)};
 }
 
 std::string as_glob(const std::string& file) {
@@ -313,11 +294,12 @@ std::string as_glob(const std::string& file) {
 }
 
 Result<InitialProject> initial_project(const std::string& folder) {
-  MODAR_ASSIGN(const Found found, look_through(folder));
-  if (found.models.empty() && found.pictures.empty()) {
-    return fail(ExitCode::kInvalidInput, "project.nothing", folder,
-                "there is neither a model (OBJ, glTF, GLB, PLY, STL) nor a picture in it" +
-                    left_out_words(found),
+  MODAR_ASSIGN(Found found, look_through(folder));
+  const auto& left_out = found.files.left_out;
+  if (found.files.models.empty() && found.pictures.empty()) {
+    std::string cause = "there is neither a model (OBJ, glTF, GLB, PLY, STL) nor a picture in it";
+    for (const LeftOut& one : left_out) cause += "; left out: " + to_line(one.error);
+    return fail(ExitCode::kInvalidInput, "project.nothing", folder, cause,
                 "put some there, or name another folder");
   }
   std::error_code error;
@@ -336,8 +318,7 @@ Result<InitialProject> initial_project(const std::string& folder) {
       "#out = \"out\"\n"
       "#light = \"room.hdr\"      # panorama or photo of the room whose light falls on the "
       "scenes\n\n"
-      "[bake]\n"
-      "parameters = [\"none\"]     # the ModAR paper's features are for other programs only\n" +
+      "[bake]\n" +
       suggestions() +
       "\n"
       "#[[tier]]                 # the same bundles once more, for other devices\n"
@@ -349,13 +330,20 @@ Result<InitialProject> initial_project(const std::string& folder) {
       "#min-grade = \"C\"\n\n";
   std::vector<std::string> models;
   std::vector<std::string> patterns;
-  text += tables("model", found.models, {}, "", models);
-  text +=
-      tables("pattern", found.pictures, found.textures,
-             "\n#width-mm = 210          # as printed, where the file does not state it", patterns);
+  std::vector<fs::path> others(found.files.textures.begin(), found.files.textures.end());
+  for (const LeftOut& one : left_out) others.emplace_back(one.file);
+  for (const PatternRequest& picture : found.pictures) {
+    if (picture.shape.corners) others.emplace_back(picture.path);
+  }
+  std::vector<PatternRequest> files;
+  for (const std::string& model : found.files.models) files.push_back({model});
+  text += tables("model", files, others, "", models);
+  text += tables("pattern", found.pictures, others,
+                 "\n#width = \"210mm\"         # as printed, where the file does not state it",
+                 patterns);
   text += scenes(found, models, patterns);
   while (text.ends_with("\n\n")) text.pop_back();
-  return InitialProject{text, left_out_words(found)};
+  return InitialProject{text, std::move(found.said)};
 }
 
 }  // namespace modar

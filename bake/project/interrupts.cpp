@@ -21,7 +21,7 @@ struct Interrupts::Watch {
     int signal = 0;
     if (::sigwait(&signals, &signal) != 0 || stop) return;
     const std::lock_guard lock(writing);
-    std::fputs("\nmodar: interrupted; what is finished stays in the cache\n", stderr);
+    std::fputs("\nmodar: interrupted; finished parts stay in the cache\n", stderr);
     ::_exit(128 + signal);
   }
 };

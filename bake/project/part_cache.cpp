@@ -70,7 +70,7 @@ std::string_view text_of(const MappedFile& file) {
 
 /// What an entry says of itself.
 struct EntryHead {
-  std::string key;     ///< under which it lies
+  std::string key;     ///< of its entry
   std::string name;    ///< of the asset's file
   std::string digest;  ///< of the bundle
   std::string hash;  ///< the same by BLAKE2b, which nobody can meet; empty: the entry is not signed
@@ -137,7 +137,7 @@ struct CacheFiles {
 
 constexpr const char* kEntryFiles[] = {".modar", ".json", ".minisig"};
 
-/// Whatever lies in the place of an entry's bundle is one, damaged where it is no file.
+/// Any file in the place of an entry's bundle is one, damaged where it is no file.
 Result<CacheFiles> files_of_cache(const std::string& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) return folder_error(folder, "there is no such folder");
@@ -207,7 +207,7 @@ std::optional<CachedPart> read_entry(const std::string& stem, const std::string&
   part.file = std::move(*file);
   part.notes = std::move(*notes);
   const auto bundle = BundleView::open(part.file.bytes());
-  const bool whole = bundle && digest_of(text_of(part.file)) == head.digest;
+  const bool whole = bundle && digest_of(text_of(part.file)) == head.digest && part.file.intact();
   if (head.key != key || (name != nullptr && head.name != *name)) reason = kEntryOther;
   if (!whole || reason == kEntryOther) return std::nullopt;
   if (signer && (head.hash != to_hex(bundle_hash(part.file.bytes())) ||

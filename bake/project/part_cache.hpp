@@ -18,7 +18,7 @@
 
 namespace modar {
 
-/// What the bake of an asset gave beside its bundle.
+/// Results of an asset's bake other than its bundle.
 struct PartNotes {
   std::array<double, 3> model_sides{};
   std::vector<Diagnostic> diagnostics;
@@ -41,8 +41,8 @@ class PartCache {
   /// own folder. Nothing: it was never baked.
   [[nodiscard]] std::optional<std::vector<std::string>> files_of(const std::string& action) const;
   [[nodiscard]] bool has(const std::string& key) const;
-  /// The entry of the key and of the asset's file `name`. Nothing where there is none that can be
-  /// believed: `reason` then says what was wrong with the one that there was, and is else empty.
+  /// The entry of the key and of the asset's file `name`. Nothing if there is no trustworthy one:
+  /// `reason` then states the fault of the existing one, and is else empty.
   [[nodiscard]] std::optional<CachedPart> read(const std::string& key, const std::string& name,
                                                std::string& reason) const;
   Result<void> write_files(const std::string& action, const std::vector<std::string>& files) const;

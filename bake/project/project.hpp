@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bake/bundle/bundle_builder.hpp"
+#include "bake/bundle/files/sorted_files.hpp"
 #include "bake/report.hpp"
 #include "formats/base/error.hpp"
 
@@ -39,15 +40,15 @@ struct ProjectScene {
   Words texts;
   Words alts;                          ///< what a screen reader says is seen
   std::vector<NodeRequest> nodes;      ///< files: relative to the project's folder
-  std::vector<ActionRequest> actions;  ///< on anything that stands on the pattern
+  std::vector<ActionRequest> actions;  ///< on any node of the pattern
   std::optional<std::size_t> table;    ///< which [[scene]] of the file; nothing: it has none
   std::string where;                   ///< of that table: "modar.toml:12:1"
 };
 
-/// Which assets go into one file. Models of the patterns' scenes come along.
+/// Which assets go into one file: see assets_of(). Models of the patterns' scenes come along.
 struct ProjectBundle {
   std::string name;
-  std::vector<std::string> models;    ///< names, * and ? match; both empty: everything
+  std::vector<std::string> models;    ///< names, * and ? match
   std::vector<std::string> patterns;  ///< the same
 };
 
@@ -66,7 +67,7 @@ struct ProjectGates {
   std::uint64_t max_bytes = 0;  ///< of the file; 0: any
 };
 
-/// A project file as it was read, globs expanded.
+/// A parsed project file, globs expanded.
 struct Project {
   std::string file;               ///< path of the project file
   bool outside = false;           ///< may use files outside its folder
@@ -102,9 +103,9 @@ Result<Project> read_project(const std::string& path, bool outside = false);
 /// The same of a text that is to become the file `path`.
 Result<Project> read_project_text(const std::string& text, const std::string& path);
 
-/// A project that is being written: what can be read of it, and what is wrong with the rest.
+/// A project that is being written: the readable part, and the faults of the rest.
 struct ProjectDraft {
-  Project project;              ///< tables with errors are left out, or lack what is wrong
+  Project project;              ///< tables with errors are left out, or lack the wrong keys
   std::vector<Error> problems;  ///< those of read_project(), one a table at most for each kind
 };
 ProjectDraft read_draft(const std::string& text, const std::string& path);
@@ -113,21 +114,49 @@ ProjectDraft read_draft(const std::string& text, const std::string& path);
 struct FoundAssets {
   std::vector<std::string> models;
   std::vector<std::string> pictures;  ///< without those that a material of any model names
+  std::vector<LeftOut> left_out;      ///< unread keys
 };
 /// Errors: kIo "io.folder".
 Result<FoundAssets> find_assets(const std::string& folder);
+
+/// Assets that no scene of a bundle names.
+struct NeverShown {
+  enum class Kind : std::uint8_t {
+    kLeftOut,  ///< models
+    kKept,     ///< models that the bundle names
+    kBare      ///< patterns
+  } kind;
+  std::string names;  ///< "a, b and 3 more"
+};
+inline constexpr const char* kNeverShown = "project.never-shown";
+/// The finding of a bundle's file.
+Diagnostic finding_of(const NeverShown& what, const std::string& file);
+
+/// What goes into a bundle of a project, in the project's order.
+struct BundleAssets {
+  std::vector<const ProjectAsset*> models;
+  std::vector<const ProjectAsset*> patterns;
+  std::vector<const ProjectScene*> scenes;
+  std::vector<NeverShown> never_shown;
+};
+
+/// A bundle that names neither models nor patterns gets all patterns, the models that scenes show,
+/// and all models where there is no pattern. `project` outlives the answer.
+BundleAssets assets_of(const Project& project, const ProjectBundle& bundle);
 
 /// The glob that matches this file alone.
 std::string as_glob(const std::string& file);
 
 struct InitialProject {
   std::string text;
-  std::string left_out;  ///< "; left out, ...: a.fbx", for a message; empty: nothing
+  std::vector<Diagnostic>
+      said;  ///< corners that were found, pairs that are guesses, files left out
 };
 
 /// The text of a project file, with comments, for the models and pictures in a folder and below it
-/// (hidden ones and `out` left out). A picture that a model uses as a texture is no pattern.
-/// Errors: kIo "io.folder"; kInvalidInput "project.nothing" where there are none.
+/// (hidden ones and `out` left out). A picture that a model uses as a texture is no pattern. Files
+/// that cannot be read are left out, so that the project bakes without an edit.
+/// Errors: kIo "io.folder"; kInvalidInput "project.nothing" if none.
 Result<InitialProject> initial_project(const std::string& folder);
 
 /// The JSON schema of project files: modar.schema.json.
@@ -166,9 +195,9 @@ struct ProjectOutcome {
   std::vector<Error> errors;            ///< of assets and bundles that failed; the others stand
 };
 
-/// Bakes what changed and links the bundles that it belongs to. What is finished stays in the
-/// cache, whatever happens then. Errors: those of the folders that it writes to; what concerns one
-/// asset or one bundle is in the outcome.
+/// Bakes what changed and links the bundles that it belongs to. Finished parts stay in the cache,
+/// whatever happens then. Errors: those of the folders that it writes to; what concerns one asset
+/// or one bundle is in the outcome.
 Result<ProjectOutcome> bake_project(const Project& project, const ProjectOptions& options,
                                     const ProgressCallback& progress);
 
@@ -180,11 +209,11 @@ struct CacheSummary {
 };
 Result<CacheSummary> summarise_cache(const std::string& folder);
 /// Removes those that were used longest ago until at most `bytes` are left, and what interrupted
-/// processes left more than a day ago. Answers what was removed. dry_run: what would be.
+/// processes left more than a day ago. Returns the removed entries. dry_run: what would be.
 Result<CacheSummary> prune_cache(const std::string& folder, std::uint64_t bytes,
                                  bool dry_run = false);
-/// Reads every entry and removes what is damaged, not what its name says, or not signed with the
-/// key of the file `cache_key` (empty: none is asked for): it is baked again when needed.
+/// Reads every entry and removes those that are damaged, not what their name says, or not signed
+/// with the key of the file `cache_key` (empty: none is requested): it is baked again when needed.
 Result<CacheSummary> verify_cache(const std::string& folder, const std::string& cache_key);
 
 }  // namespace modar

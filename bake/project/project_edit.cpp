@@ -192,7 +192,7 @@ class Editor {
   struct Found {
     std::optional<TextSpan> value;
     TomlPair pair;
-    TextSpan braces;               ///< that the pair stands in; empty: lines
+    TextSpan braces;               ///< that contains the pair; empty: lines
     std::vector<TomlPair> beside;  ///< all pairs there
   };
   [[nodiscard]] Found find_key(const Place& place, const Key& key) const {
@@ -265,7 +265,7 @@ class Editor {
     const std::size_t begin = line_begin(text_, sections_[place.first].header.begin);
     std::size_t end = begin;
     for (std::size_t i = place.first; i < place.last; ++i) end = std::max(end, end_of(i));
-    // What is commented out right below belongs to it, as does one blank line.
+    // Commented lines right below belong to it, as does one blank line.
     while (end < text_.size() && !is_blank_line(text_, end) &&
            text_[text_.find_first_not_of(" \t", end)] == '#') {
       end = line_end(text_, end);
@@ -363,7 +363,7 @@ class Editor {
     }
     std::size_t at = end_of(section);
     if (place.first == 0) at = end_above(place.prefix);
-    // Beside its like: "text.de" behind "text.en".
+    // Next to its like: "text.de" behind "text.en".
     for (const TomlPair& pair : sections_[section].pairs) {
       const bool like = whole.size() > 1 && pair.key.size() == whole.size() &&
                         std::equal(pair.key.begin(), pair.key.end() - 1, whole.begin());
@@ -465,7 +465,7 @@ Result<std::string> add_table(const std::string& text, const std::string& name, 
     const Place last = editor.find({name, count - 1});
     at = 0;
     for (std::size_t i = last.first; i < last.last; ++i) at = std::max(at, editor.end_of(i));
-    // Behind what is commented out right below.
+    // Behind commented lines right below.
     while (at < text.size() && !is_blank_line(text, at) &&
            text[text.find_first_not_of(" \t", at)] == '#') {
       at = line_end(text, at);

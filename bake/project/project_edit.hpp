@@ -1,4 +1,4 @@
-// Changes to the text of modar.toml that leave every other byte as it is: comments, order, spaces,
+// Changes to the text of modar.toml that leave every other byte unchanged: comments, order, spaces,
 // and keys that this version does not know.
 #pragma once
 

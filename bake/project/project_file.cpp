@@ -22,6 +22,7 @@
 #include <optional>
 #include <set>
 
+#include "bake/io/input.hpp"
 #include "bake/options/request_text.hpp"
 #include "bake/project/project.hpp"
 #include "bake/project/settings.hpp"
@@ -71,6 +72,16 @@ class TableReader {
   Result<void> take(std::string_view key, bool& value) const {
     return take_as<bool>(key, "true or false", value);
   }
+  /// A length with its unit.
+  Result<void> take_length(std::string_view key, double& mm) const {
+    std::string text;
+    MODAR_TRY(take(key, text));
+    if (text.empty()) return {};
+    const auto length = parse_millimetres(text);
+    if (!length) return refused(key, "", length.error());
+    mm = *length;
+    return {};
+  }
   /// least: the least value that is allowed.
   Result<void> take(std::string_view key, double& value, double least) const {
     MODAR_TRY(take_as<double>(key, "a number", value));
@@ -95,7 +106,7 @@ class TableReader {
     return {};
   }
   /// A text, a number, or a list of numbers, as --scene has them: "y", "0.8", "0:0:20".
-  Result<void> take_scene_value(std::string_view key, std::string& text) const {
+  Result<void> parse_scene_value(std::string_view key, std::string& text) const {
     const toml::node* node = table_.get(key);
     if (node == nullptr) return {};
     if (const auto* plain = node->as_string()) {
@@ -116,13 +127,13 @@ class TableReader {
     return wrong(key, "a number, a text, or a list of numbers");
   }
   /// Numbers, in lists of any depth, in their order: "212:80:905:131".
-  Result<void> take_numbers(std::string_view key, std::string& text) const {
+  Result<void> parse_numbers(std::string_view key, std::string& text) const {
     const toml::node* node = table_.get(key);
     if (node == nullptr || add_numbers(*node, text)) return {};
     return wrong(key, "a list of numbers");
   }
   /// The tables of an array within, [[key]] or [[name.key]].
-  [[nodiscard]] Result<std::vector<TableReader>> take_tables(const std::string& key) const {
+  [[nodiscard]] Result<std::vector<TableReader>> parse_tables(const std::string& key) const {
     std::vector<TableReader> list;
     const toml::node* node = table_.get(key);
     if (node == nullptr) return list;
@@ -137,7 +148,7 @@ class TableReader {
     return list;
   }
   /// "[key]" of the file, or nothing.
-  [[nodiscard]] Result<std::optional<TableReader>> take_table(const std::string& key) const {
+  [[nodiscard]] Result<std::optional<TableReader>> parse_table(const std::string& key) const {
     const toml::node* node = table_.get(key);
     if (node == nullptr) return std::nullopt;
     if (node->as_table() == nullptr) return wrong(key, "[" + key + "] above its keys");
@@ -156,16 +167,16 @@ class TableReader {
     return {};
   }
 
-  /// The settings of the bake that stand in this table.
-  Result<void> take_settings(Settings& settings) const {
+  /// The settings of the bake in this table.
+  Result<void> parse_settings(Settings& settings) const {
     for (const BakeOption& option : bake_options()) {
-      if (option.part == OptionPart::kProject || !has(option.key)) continue;
+      if (option.part == OptionPart::kProject || !has(option.name)) continue;
       std::string value;
-      MODAR_TRY(take_setting(option, value));
-      settings[option.key] = value;
+      MODAR_TRY(parse_setting(option, value));
+      settings[option.name] = value;
       BakeRequest trial;
-      if (auto good = take_option(option, value, trial); !good) {
-        return refused(option.key, "", {good.error().cause, good.error().cure});
+      if (auto good = parse_option(option, value, trial); !good) {
+        return refused(option.name, "", {good.error().cause, good.error().cure});
       }
     }
     return {};
@@ -216,23 +227,19 @@ class TableReader {
     return good;
   }
 
-  Result<void> take_setting(const BakeOption& option, std::string& value) const {
+  Result<void> parse_setting(const BakeOption& option, std::string& value) const {
     const auto* word = std::get_if<WordOption>(&option.value);
     if (std::holds_alternative<TruthOption>(option.value) || (word != nullptr && word->truth)) {
       bool truth = false;
-      MODAR_TRY(take(option.key, truth));
+      MODAR_TRY(take(option.name, truth));
       value = truth ? "true" : "false";
     } else if (std::holds_alternative<NumberOption>(option.value)) {
       double number = 0;
-      MODAR_TRY(take(option.key, number, 0));
+      MODAR_TRY(take(option.name, number, 0));
       value = std::to_string(static_cast<long long>(number));
-      if (number != std::floor(number)) return wrong(option.key, "a whole number");
-    } else if (std::holds_alternative<WordsOption>(option.value)) {
-      std::vector<std::string> words;
-      MODAR_TRY(take(option.key, words));
-      for (const std::string& one : words) value += (value.empty() ? "" : ",") + one;
+      if (number != std::floor(number)) return wrong(option.name, "a whole number");
     } else {
-      MODAR_TRY(take(option.key, value));
+      MODAR_TRY(take(option.name, value));
     }
     return {};
   }
@@ -242,7 +249,7 @@ class TableReader {
   std::string name_;
 };
 
-/// The globs for glob() of one in which "**/" stands for any number of folders.
+/// The globs for glob() of one in which "**/" represents any number of folders.
 std::vector<std::string> plain_globs(const std::string& folder, const std::string& pattern) {
   const std::size_t deep = pattern.find("**/");
   if (deep == std::string::npos) return {folder + pattern};
@@ -302,7 +309,7 @@ std::vector<std::string> expand(const std::string& folder, const std::string& pa
 Keys keys_with_settings(Keys keys, std::optional<OptionPart> part) {
   for (const BakeOption& option : bake_options()) {
     if (part ? option.part == *part : option.part != OptionPart::kProject) {
-      keys.push_back(option.key);
+      keys.push_back(option.name);
     }
   }
   return keys;
@@ -310,12 +317,15 @@ Keys keys_with_settings(Keys keys, std::optional<OptionPart> part) {
 
 Error no_toml(const std::string& path, const toml::parse_error& error) {
   return {ExitCode::kInvalidInput, "project.toml", place(path, error.source()),
-          std::string(error.description()), "correct the line; see toml.io"};
+          std::string(error.description()),
+          error.description().find("','") == std::string_view::npos
+              ? "correct the line; see toml.io"
+              : "write numbers with a point (12.5), and quote texts; see toml.io"};
 }
 
 class ProjectReader {
  public:
-  /// problems: receives what is wrong, and the rest is read; nullptr: the first error ends it.
+  /// problems: receives the faults, and the rest is read; nullptr: the first error ends it.
   ProjectReader(const std::string& file, const toml::table& root, bool outside,
                 std::vector<Error>* problems = nullptr)
       : whole_(project_.file, root, "the file"), problems_(problems) {
@@ -357,7 +367,7 @@ class ProjectReader {
 
   Result<void> read_project_table() {
     name_ = fs::absolute(project_.file).lexically_normal().parent_path().filename().string();
-    MODAR_ASSIGN(const auto reader, whole_.take_table("project"));
+    MODAR_ASSIGN(const auto reader, whole_.parse_table("project"));
     if (!reader) return {};
     MODAR_TRY(reader->allow({"name", "out", "cache", "light"}));
     MODAR_TRY(reader->take("name", name_));
@@ -390,18 +400,18 @@ class ProjectReader {
   }
 
   Result<void> read_bake() {
-    MODAR_ASSIGN(const auto reader, whole_.take_table("bake"));
+    MODAR_ASSIGN(const auto reader, whole_.parse_table("bake"));
     if (reader) {
       MODAR_TRY(reader->allow(keys_with_settings({}, std::nullopt)));
-      MODAR_TRY(reader->take_settings(project_.settings));
+      MODAR_TRY(reader->parse_settings(project_.settings));
     }
-    MODAR_ASSIGN(const auto tiers, whole_.take_tables("tier"));
+    MODAR_ASSIGN(const auto tiers, whole_.parse_tables("tier"));
     for (const TableReader& tier : tiers) {
       MODAR_TRY(tier.allow(keys_with_settings({"name"}, std::nullopt)));
       ProjectTier read;
       MODAR_TRY(tier.take("name", read.name));
       if (!is_plain(read.name)) return wrong_name(tier);
-      MODAR_TRY(tier.take_settings(read.settings));
+      MODAR_TRY(tier.parse_settings(read.settings));
       project_.tiers.push_back(std::move(read));
     }
     if (project_.tiers.empty()) project_.tiers.emplace_back();
@@ -410,10 +420,10 @@ class ProjectReader {
 
   Result<void> read_assets(const std::string& kind, bool pattern,
                            std::vector<ProjectAsset>& assets) {
-    MODAR_ASSIGN(const auto readers, whole_.take_tables(kind));
+    MODAR_ASSIGN(const auto readers, whole_.parse_tables(kind));
     Keys keys =
         keys_with_settings({"file", "name"}, pattern ? OptionPart::kPattern : OptionPart::kModel);
-    if (pattern) keys.insert(keys.end(), {"width-mm", "height-mm", "corners", "shape"});
+    if (pattern) keys.insert(keys.end(), {"width", "height", "corners", "shape"});
     std::set<std::string> seen;
     for (std::size_t i = 0; i < readers.size(); ++i) {
       MODAR_TRY(told(readers[i].allow(keys)));
@@ -424,7 +434,7 @@ class ProjectReader {
     return {};
   }
 
-  /// shape, corners and height-mm together are what --pattern has in one text.
+  /// shape, corners and height together are what --pattern has in one text.
   static Result<void> take_shape(const TableReader& reader, ShapeRequest& shape) {
     std::string text;
     MODAR_TRY(reader.take("shape", text));
@@ -432,19 +442,28 @@ class ProjectReader {
       return reader.wrong("shape", "shape = \"cylinder,diameter=66mm,arc=120\"");
     }
     std::string corners;
-    MODAR_TRY(reader.take_numbers("corners", corners));
-    double height = 0;
-    MODAR_TRY(reader.take("height-mm", height, 0));
-    if (text.empty() && (!corners.empty() || height > 0)) text = "flat";
+    MODAR_TRY(reader.parse_numbers("corners", corners));
+    std::string height;
+    double height_mm = 0;
+    MODAR_TRY(reader.take("height", height));
+    MODAR_TRY(reader.take_length("height", height_mm));
+    if (text.empty() && (!corners.empty() || !height.empty())) text = "flat";
     if (!corners.empty()) text += ",corners=" + corners;
-    if (height > 0) text += ",height=" + shortest_text(height) + "mm";
+    if (!height.empty()) text += ",height=" + height;
     if (text.empty()) return {};
     auto parsed = parse_shape(text);
     if (!parsed && corners.empty())
-      return reader.wrong("height-mm", "it together with corners = [...]");
+      return reader.wrong("height", "it together with corners = [...]");
     if (!parsed) return reader.wrong("corners", "[[212, 80], [905, 131], [870, 640], [190, 602]]");
     shape = std::move(*parsed);
     return {};
+  }
+
+  static tl::unexpected<Error> no_match(const TableReader& reader, const char* key,
+                                        const std::string& file) {
+    return missing_file(
+        file, {ExitCode::kInvalidInput, "project.no-match", reader.at(key),
+               "there is no file '" + file + "'", "correct the name, or remove the line"});
   }
 
   /// The files of a table's globs; those after a "!" are left out.
@@ -460,9 +479,9 @@ class ProjectReader {
     asset.where = reader.where();
     MODAR_TRY(reader.take("name", asset.name));
     if (printable(asset.name) != asset.name) return reader.wrong("name", "a name of letters");
-    MODAR_TRY(reader.take("width-mm", asset.width_mm, 0));
+    MODAR_TRY(reader.take_length("width", asset.width_mm));
     MODAR_TRY(take_shape(reader, asset.shape));
-    MODAR_TRY(reader.take_settings(asset.settings));
+    MODAR_TRY(reader.parse_settings(asset.settings));
     const std::string name = asset.name;
     std::set<std::string> left_out;
     for (const std::string& glob : globs) {
@@ -475,8 +494,7 @@ class ProjectReader {
       add_folders(project_.folder, glob, project_.folders);
       const std::vector<std::string> files = expand(project_.folder, glob);
       if (files.empty()) {
-        return fail(ExitCode::kInvalidInput, "project.no-match", reader.at("file"),
-                    "there is no file '" + glob + "'", "correct the name, or remove the line");
+        return no_match(reader, "file", glob);
       }
       for (const std::string& file : files) {
         if (left_out.count(file) != 0) continue;
@@ -495,7 +513,7 @@ class ProjectReader {
   }
 
   Result<void> read_scenes() {
-    MODAR_ASSIGN(const auto readers, whole_.take_tables("scene"));
+    MODAR_ASSIGN(const auto readers, whole_.parse_tables("scene"));
     for (std::size_t i = 0; i < readers.size(); ++i) MODAR_TRY(told(read_scene(readers[i], i)));
     if (readers.empty()) make_scenes();
     return {};
@@ -516,7 +534,7 @@ class ProjectReader {
     if (reader.has("model") || scene.nodes.empty()) {
       MODAR_TRY(known(reader, "model", scene.request.model, project_.models));
     }
-    MODAR_TRY(take_node(reader, scene.request));
+    MODAR_TRY(parse_node(reader, scene.request));
     MODAR_TRY(read_placement(reader, scene.request));
     MODAR_TRY(reader.take("centred", scene.request.centred));
     scene.request.light = project_.light;
@@ -528,7 +546,7 @@ class ProjectReader {
   }
 
   /// What a scene's model, its pictures and labels have in common.
-  static Result<void> take_node(const TableReader& reader, SceneRequest& place) {
+  static Result<void> parse_node(const TableReader& reader, SceneRequest& place) {
     MODAR_TRY(reader.take("name", place.name));
     if (printable(place.name) != place.name) return reader.wrong("name", "a name of letters");
     MODAR_TRY(reader.take("hidden", place.hidden));
@@ -536,15 +554,15 @@ class ProjectReader {
   }
 
   Result<void> read_nodes(const TableReader& scene_reader, ProjectScene& scene) {
-    MODAR_ASSIGN(const auto pictures, scene_reader.take_tables("picture"));
+    MODAR_ASSIGN(const auto pictures, scene_reader.parse_tables("picture"));
     for (const TableReader& reader : pictures) MODAR_TRY(read_picture(reader, scene));
-    MODAR_ASSIGN(const auto videos, scene_reader.take_tables("video"));
+    MODAR_ASSIGN(const auto videos, scene_reader.parse_tables("video"));
     for (const TableReader& reader : videos) MODAR_TRY(read_video(reader, scene));
-    MODAR_ASSIGN(const auto sounds, scene_reader.take_tables("sound"));
+    MODAR_ASSIGN(const auto sounds, scene_reader.parse_tables("sound"));
     for (const TableReader& reader : sounds) MODAR_TRY(read_sound(reader, scene));
-    MODAR_ASSIGN(const auto labels, scene_reader.take_tables("label"));
+    MODAR_ASSIGN(const auto labels, scene_reader.parse_tables("label"));
     for (const TableReader& reader : labels) MODAR_TRY(read_label(reader, scene));
-    MODAR_ASSIGN(const auto actions, scene_reader.take_tables("action"));
+    MODAR_ASSIGN(const auto actions, scene_reader.parse_tables("action"));
     for (const TableReader& reader : actions) MODAR_TRY(read_action(reader, scene));
     return {};
   }
@@ -560,7 +578,7 @@ class ProjectReader {
                             "hidden", "group", "alt", "play", "loop", "alpha", "captions"}));
     NodeRequest node;
     node.kind = NodeKind::kVideo;
-    MODAR_TRY(take_playing(reader, node));
+    MODAR_TRY(parse_playing(reader, node));
     std::string alpha = "none";
     MODAR_TRY(reader.take("alpha", alpha));
     if (const auto read = parse_alpha(alpha, node); !read) {
@@ -573,14 +591,14 @@ class ProjectReader {
     MODAR_TRY(reader.allow({"file", "name", "play", "loop", "captions"}));
     NodeRequest node;
     node.kind = NodeKind::kSound;
-    MODAR_TRY(take_playing(reader, node));
+    MODAR_TRY(parse_playing(reader, node));
     MODAR_TRY(take_node_file(reader, scene, node));
     scene.nodes.push_back(std::move(node));
     return {};
   }
 
   /// What videos and sounds have in common.
-  Result<void> take_playing(const TableReader& reader, NodeRequest& node) const {
+  Result<void> parse_playing(const TableReader& reader, NodeRequest& node) const {
     MODAR_TRY(reader.take("play", node.plays));
     MODAR_TRY(reader.take("loop", node.loops));
     MODAR_TRY(reader.take("captions", node.captions));
@@ -597,7 +615,7 @@ class ProjectReader {
     node.place.pattern = scene.request.pattern;
     MODAR_TRY(take_file(reader, "file", node.file));
     if (node.file.empty()) return reader.wrong("file", "file = \"map.png\"");
-    MODAR_TRY(take_node(reader, node.place));
+    MODAR_TRY(parse_node(reader, node.place));
     if (node.place.name.empty()) node.place.name = file_stem(node.file);
     return {};
   }
@@ -613,18 +631,17 @@ class ProjectReader {
   }
 
   static Result<void> read_label(const TableReader& reader, ProjectScene& scene) {
-    constexpr std::size_t kMostMarkBytes = 32;
     MODAR_TRY(reader.allow({"name", "mark", "offset", "hidden", "group", "title", "text"}));
     NodeRequest node;
     node.kind = NodeKind::kLabel;
     node.where = reader.at("name");
     node.place.pattern = scene.request.pattern;
-    MODAR_TRY(take_node(reader, node.place));
+    MODAR_TRY(parse_node(reader, node.place));
     node.mark =
         std::to_string(1 + std::ranges::count(scene.nodes, NodeKind::kLabel, &NodeRequest::kind));
     MODAR_TRY(reader.take("mark", node.mark));
     if (node.place.name.empty()) node.place.name = node.mark;
-    if (node.mark.empty() || node.mark.size() > kMostMarkBytes ||
+    if (node.mark.empty() || node.mark.size() > kMaxMarkBytes ||
         printable(node.mark) != node.mark) {
       return reader.wrong("mark", "a number or a short word");
     }
@@ -658,12 +675,12 @@ class ProjectReader {
     return {};
   }
 
-  /// A key whose value is written as in --scene, where lists of numbers may stand for "X:Y:Z".
+  /// A key whose value is written as in --scene, where lists of numbers may replace "X:Y:Z".
   static Result<void> read_part(const TableReader& reader, const char* key, SceneRequest& scene) {
     if (!reader.has(key)) return {};
     std::string text;
-    MODAR_TRY(reader.take_scene_value(key, text));
-    const auto taken = take_scene_part(key, text, scene);
+    MODAR_TRY(reader.parse_scene_value(key, text));
+    const auto taken = parse_scene_part(key, text, scene);
     if (taken) return {};
     return reader.refused(key, " = " + text, taken.error());
   }
@@ -689,8 +706,7 @@ class ProjectReader {
     std::error_code error;
     if (!file.empty()) MODAR_TRY(keep_inside(reader, key, file));
     if (file.empty() || fs::is_regular_file(project_.path(file), error)) return {};
-    return fail(ExitCode::kInvalidInput, "project.no-match", reader.at(key),
-                "there is no file '" + file + "'", "correct the name, or remove the line");
+    return no_match(reader, key, file);
   }
 
   static Result<void> known(const TableReader& reader, const char* key, const std::string& name,
@@ -705,7 +721,7 @@ class ProjectReader {
                                 : "did you mean '" + std::string(nearest) + "'?");
   }
 
-  /// Without [[scene]]: models stand on patterns of their name, and one on one.
+  /// Without [[scene]]: models are on patterns of their name, and one on one.
   void make_scenes() {
     for (const ProjectAsset& model : project_.models) {
       for (const ProjectAsset& pattern : project_.patterns) {
@@ -721,7 +737,7 @@ class ProjectReader {
   }
 
   Result<void> read_bundles() {
-    MODAR_ASSIGN(const auto readers, whole_.take_tables("bundle"));
+    MODAR_ASSIGN(const auto readers, whole_.parse_tables("bundle"));
     for (const TableReader& reader : readers) {
       MODAR_TRY(reader.allow({"name", "models", "patterns"}));
       ProjectBundle bundle;
@@ -736,7 +752,7 @@ class ProjectReader {
   }
 
   Result<void> read_gates() {
-    MODAR_ASSIGN(const auto reader, whole_.take_table("gates"));
+    MODAR_ASSIGN(const auto reader, whole_.parse_table("gates"));
     if (!reader) return {};
     MODAR_TRY(reader->allow({"min-psnr", "min-ssim", "min-score", "min-grade", "max-bytes"}));
     MODAR_TRY(reader->take("min-psnr", project_.gates.min_psnr_db, 0));
@@ -771,13 +787,7 @@ NodeRequest Project::located(NodeRequest node) const {
 }
 
 bool Project::may_use(const std::string& name) const {
-  if (outside) return true;
-  std::error_code error;
-  const fs::path own = fs::canonical(folder.empty() ? "." : folder, error);
-  const fs::path whole = fs::weakly_canonical(fs::absolute(name, error), error);
-  // Of what cannot be looked at nothing is known.
-  const fs::path relative = whole.lexically_relative(own);
-  return !error && !relative.empty() && *relative.begin() != "..";
+  return outside || is_inside(folder, name);
 }
 
 Result<Project> read_project(const std::string& path, bool outside) {

@@ -6,7 +6,7 @@
 namespace modar {
 namespace {
 
-/// What is no option of the bake.
+/// Keys that are not options of the bake.
 constexpr const char* kTables = R"json({"$schema": "http://json-schema.org/draft-07/schema#",
  "title": "modar.toml: a project of ModAR",
  "type": "object", "additionalProperties": false,
@@ -17,7 +17,7 @@ constexpr const char* kTables = R"json({"$schema": "http://json-schema.org/draft
       "description": "Of the bundle, out/NAME.modar; without it, the folder's"},
     "out": {"type": "string", "default": "out", "description": "Folder of the bundles"},
     "cache": {"type": "string", "default": ".modar/cache",
-      "description": "Folder of what is baked already; several machines may share it"}}},
+      "description": "Folder of finished bakes; several machines may share it"}}},
   "bake": {"type": "object", "description": "Options for all models and patterns",
     "additionalProperties": false, "properties": {
 }},
@@ -29,27 +29,27 @@ constexpr const char* kTables = R"json({"$schema": "http://json-schema.org/draft
     "description": "Models: OBJ, glTF, GLB", "additionalProperties": false,
     "required": ["file"], "properties": {
     "file": {"type": ["string", "array"], "items": {"type": "string"},
-      "description": "Files, relative to this one: * ? [] match, **/ stands for any folders, a ! before it leaves files out"},
+      "description": "Files, relative to this one: * ? [] match, **/ matches any folders, a ! before it leaves files out"},
     "name": {"type": "string",
       "description": "What scenes call it; without it, the file's without extension"}}}},
   "pattern": {"type": "array", "items": {"type": "object",
     "description": "Pictures of flat things, frontal", "additionalProperties": false,
     "required": ["file"], "properties": {
     "file": {"type": ["string", "array"], "items": {"type": "string"},
-      "description": "Files, relative to this one: * ? [] match, **/ stands for any folders, a ! before it leaves files out"},
+      "description": "Files, relative to this one: * ? [] match, **/ matches any folders, a ! before it leaves files out"},
     "name": {"type": "string",
       "description": "What scenes call it; without it, the file's without extension"},
-    "width-mm": {"type": "number", "minimum": 0,
-      "description": "As printed, in millimetres; without it, what the file or the shape states"},
-    "height-mm": {"type": "number", "exclusiveMinimum": 0,
-      "description": "Beside corners: as printed, in millimetres; without it, as the perspective tells"},
+    "width": {"type": "string",
+      "description": "As printed, \"210mm\"; without it, what the file or the shape states"},
+    "height": {"type": "string",
+      "description": "With corners: as printed, \"297mm\"; without it, as the perspective tells"},
     "corners": {"type": "array", "minItems": 4, "maxItems": 4,
       "items": {"type": "array", "minItems": 2, "maxItems": 2, "items": {"type": "number"}},
       "description": "Of the picture in a photo, in pixels: [[212, 80], [905, 131], [870, 640], [190, 602]], from the top left corner clockwise; modar pattern rectify finds them"},
     "shape": {"type": "string", "pattern": "^(flat|(cylinder|cone|box),.*)",
       "description": "What it is printed on: cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,arc=100 or box,size=120x180x40mm,right=right.png"}}}},
   "scene": {"type": "array", "items": {"type": "object",
-    "description": "Which model, pictures, videos and labels stand on which pattern, what is heard, and what they do",
+    "description": "Which model, pictures, videos and labels are on which pattern, which sounds, and what they do",
     "additionalProperties": false, "required": ["pattern"], "properties": {
     "pattern": {"type": "string"},
     "model": {"type": "string", "description": "May be left out where pictures or labels are"},
@@ -59,21 +59,21 @@ constexpr const char* kTables = R"json({"$schema": "http://json-schema.org/draft
     "group": {"type": "string",
       "description": "Variants: what has the same group, of which \"next\" shows one after the other"},
     "picture": {"type": "array", "items": {"type": "object",
-      "description": "Pictures that lie or stand on the pattern", "additionalProperties": false,
+      "description": "Pictures on the pattern, flat or upright", "additionalProperties": false,
       "required": ["file"], "properties": {
       "file": {"type": "string", "description": "PNG, JPEG, WebP or TIFF, relative to this file"}}}},
     "video": {"type": "array", "items": {"type": "object",
-      "description": "Videos that lie or stand on the pattern; FFmpeg makes them H.264 in MP4, 854 x 480 at most (tier desktop: 1280 x 720)",
+      "description": "Videos on the pattern, flat or upright; FFmpeg makes them H.264 in MP4, 854 x 480 at most (tier desktop: 1280 x 720)",
       "additionalProperties": false, "required": ["file"], "properties": {
       "alpha": {"type": "string", "pattern": "^(none|beside|#[0-9a-f]{6})$", "default": "none",
-        "description": "beside: the right half of its pictures is the alpha of the left one; a colour: it is not seen"}}}},
+        "description": "`beside`: the right half of its pictures is the alpha of the left one; a colour: it is not seen"}}}},
     "sound": {"type": "array", "items": {"type": "object",
-      "description": "What is heard; FFmpeg makes it AAC in MP4", "additionalProperties": false,
+      "description": "Sounds; FFmpeg makes them AAC in MP4", "additionalProperties": false,
       "required": ["file"], "properties": {
       "name": {"type": "string",
         "description": "What actions call it; without it, the file's without extension"}}}},
     "label": {"type": "array", "items": {"type": "object",
-      "description": "Points that say what is there", "additionalProperties": false,
+      "description": "Points that describe a place", "additionalProperties": false,
       "properties": {
       "name": {"type": "string", "description": "What actions call it; without it, the mark"},
       "mark": {"type": "string",
@@ -110,19 +110,19 @@ constexpr const char* kTables = R"json({"$schema": "http://json-schema.org/draft
       "maxItems": 3,
       "description": "Right, up the picture, towards the camera: millimetres where the pattern's width is known, else its largest side; \"0:0:20mm\" names the unit"},
     "centred": {"type": "boolean", "default": false,
-      "description": "The model's centre lies in the pattern's plane; else it stands on it"},
+      "description": "The model's centre is in the pattern's plane; else its bottom is on it"},
     "light": {"type": "string",
       "description": "Radiance HDR panorama or photo of the room whose light falls on it; without it, a neutral room's"},
     "text": {"type": "object", "additionalProperties": {"type": "string"},
       "description": "Words about it, by language: text.en = \"A vase.\""},
     "alt": {"type": "object", "additionalProperties": {"type": "string"},
-      "description": "What is seen, for visitors who cannot see it, by language: alt.en = \"A red vase with two handles\""}}}},
+      "description": "A description for visitors who cannot see it, by language: alt.en = \"A red vase with two handles\""}}}},
   "bundle": {"type": "array", "items": {"type": "object",
     "description": "What goes into one file; models of the patterns' scenes come along",
     "additionalProperties": false, "required": ["name"], "properties": {
     "name": {"type": "string", "description": "Of the file, without extension"},
     "models": {"type": ["string", "array"], "items": {"type": "string"},
-      "description": "Names, where * and ? match"},
+      "description": "Names, where * and ? match; keeps models that no scene shows"},
     "patterns": {"type": ["string", "array"], "items": {"type": "string"},
       "description": "Names, where * and ? match"}}}},
   "gates": {"type": "object", "description": "What a bundle has to reach to be written",
@@ -149,11 +149,11 @@ constexpr const char* kPlane = R"json({
   "offset": {"type": ["array", "string"], "items": {"type": "number"}, "minItems": 3,
     "maxItems": 3, "description": "As of a model"},
   "centred": {"type": "boolean", "default": false,
-    "description": "Its middle lies in the pattern's plane; else it stands on it"},
+    "description": "Its middle is in the pattern's plane; else its bottom is on it"},
   "hidden": {"type": "boolean", "default": false},
   "group": {"type": "string"},
   "alt": {"type": "object", "additionalProperties": {"type": "string"},
-    "description": "What is seen on it, by language"}
+    "description": "A description of it, by language"}
 })json";
 
 /// What videos and sounds have in common.
@@ -163,7 +163,7 @@ constexpr const char* kPlayed = R"json({
     "description": "From when the pattern is found; else an action plays it"},
   "loop": {"type": "boolean", "default": false, "description": "It begins again where it ends"},
   "captions": {"type": "object", "additionalProperties": {"type": "string"},
-    "description": "Files of what is heard, WebVTT or SubRip, by language: captions.en = \"film.en.vtt\""}
+    "description": "Files of captions, WebVTT or SubRip, by language: captions.en = \"film.en.vtt\""}
 })json";
 
 /// An object whose member at "a/b", which is there, has another value.
@@ -192,8 +192,7 @@ Json schema_of(const BakeOption& option) {
   const auto* word = std::get_if<WordOption>(&option.value);
   const std::vector<std::string> choices = option_choices(option);
   if (std::holds_alternative<WordsOption>(option.value)) {
-    schema.set("type", Json::list(std::vector<std::string>{"array", "string"}));
-    schema.set("items", {{"type", "string"}});
+    schema.set("type", "string");
   } else if (const auto* number = std::get_if<NumberOption>(&option.value)) {
     schema.set("type", "integer");
     schema.set("minimum", number->least);
@@ -229,7 +228,7 @@ Json with_options(Json table, const std::string& name) {
   Json properties = table.find("properties").value_or(Json::object());
   for (const BakeOption& option : bake_options()) {
     if (!takes(name, option.part)) continue;
-    properties.set(option.key, {{"$ref", std::string("#/definitions/") + option.key}});
+    properties.set(option.name, {{"$ref", std::string("#/definitions/") + option.name}});
   }
   table.set("properties", std::move(properties));
   return table;
@@ -248,7 +247,7 @@ std::string project_schema() {
     tables.set(name, with_options(*tables.find(name), name));
   }
   Json definitions = Json::object();
-  for (const BakeOption& option : bake_options()) definitions.set(option.key, schema_of(option));
+  for (const BakeOption& option : bake_options()) definitions.set(option.name, schema_of(option));
   schema.set("properties", std::move(tables));
   schema.set("definitions", std::move(definitions));
   return schema.dump();

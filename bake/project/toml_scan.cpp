@@ -109,7 +109,7 @@ class Scanner {
       at_ += 3;
       while (!ended() && text_.substr(at_, 3) != three)
         at_ += now() == '\\' && mark == '"' ? 2U : 1U;
-      // Up to two marks may stand before those that end it.
+      // Up to two marks may precede those that end it.
       at_ = std::min(at_ + 3, text_.size());
       for (int more = 0; more < 2 && now() == mark; ++more) ++at_;
       return;
@@ -142,7 +142,7 @@ class Scanner {
 };
 
 /// "key = value"; false where none follows.
-bool take_pair(Scanner& scan, TomlPair& pair) {
+bool parse_pair(Scanner& scan, TomlPair& pair) {
   pair.whole.begin = scan.at();
   pair.key = scan.key();
   if (scan.now() != '=') return false;
@@ -161,7 +161,7 @@ std::vector<TomlSection> scan_toml(std::string_view text) {
   for (scan.space(); !scan.ended(); scan.space()) {
     if (scan.now() != '[') {
       TomlPair pair;
-      if (!take_pair(scan, pair)) return sections;
+      if (!parse_pair(scan, pair)) return sections;
       sections.back().pairs.push_back(std::move(pair));
       continue;
     }
@@ -186,7 +186,7 @@ std::vector<TomlPair> inline_pairs(std::string_view text, const TextSpan& span) 
   Scanner scan(text.substr(0, span.end), span.begin + 1);
   for (scan.space(); !scan.ended() && scan.now() != '}'; scan.space()) {
     TomlPair pair;
-    if (!take_pair(scan, pair)) return pairs;
+    if (!parse_pair(scan, pair)) return pairs;
     pairs.push_back(std::move(pair));
     scan.space();
     if (scan.now() == ',') scan.next();

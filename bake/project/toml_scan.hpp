@@ -1,4 +1,5 @@
-// Where the parts of a TOML text lie. toml++ checks what it says; this finds the bytes to change.
+// The places of the parts of a TOML text. toml++ checks what it says; this finds the bytes to
+// change.
 #pragma once
 
 #include <cstddef>
@@ -29,10 +30,11 @@ struct TomlSection {
   std::vector<TomlPair> pairs;
 };
 
-/// Sections in the order of the text, which toml++ has found valid; of others, as far as they are.
+/// Sections in the order of the text, which toml++ has found valid; of others, as far as they
+/// exist.
 std::vector<TomlSection> scan_toml(std::string_view text);
-/// The pairs of an inline table, and the elements of an array; `span` is the value. Empty where it
-/// is none.
+/// The pairs of an inline table, and the elements of an array; `span` is the value. Empty if it is
+/// not one.
 std::vector<TomlPair> inline_pairs(std::string_view text, const TextSpan& span);
 std::vector<TextSpan> array_elements(std::string_view text, const TextSpan& span);
 

@@ -7,10 +7,9 @@
 namespace modar {
 namespace {
 
-// Sizes trade what an update downloads (small pieces) against recipe bytes and requests (large
-// ones): a recipe's 64 bytes are a thousandth of a usual piece. tests/bench/ship_peers.py compares
-// updates with casync and zchunk.
-constexpr std::size_t kLeast = 8 << 10;
+// Bytes of a piece. Smaller pieces shrink updates, larger ones shrink recipes and requests; compare
+// with tests/bench/ship_peers.py.
+constexpr std::size_t kMinPieceBytes = 8 << 10;
 constexpr std::size_t kUsual = 64 << 10;
 constexpr std::size_t kMost = 256 << 10;
 // The normalised chunking of FastCDC, level 2: two mask bits more before the usual size, two fewer
@@ -37,7 +36,7 @@ constexpr std::array<std::uint64_t, 256> kGear = make_gear();
 std::size_t first_piece(std::span<const std::byte> bytes) {
   const std::size_t end = std::min(bytes.size(), kMost);
   std::uint64_t hash = 0;
-  for (std::size_t i = std::min(kLeast, end); i < end; ++i) {
+  for (std::size_t i = std::min(kMinPieceBytes, end); i < end; ++i) {
     hash = (hash << 1) + kGear[std::to_integer<std::size_t>(bytes[i])];
     if ((hash & (i < kUsual ? kRareMask : kCommonMask)) == 0) return i + 1;
   }

@@ -76,7 +76,7 @@ Child start(std::size_t task, const ProcessLimits& limits,
   return child;
 }
 
-/// Reads what is there; false once the child has closed its end.
+/// Reads available bytes; false once the child has closed its end.
 bool drain(Child& child) {
   std::array<std::byte, 65536> buffer;
   const ssize_t size = ::read(child.pipe, buffer.data(), buffer.size());

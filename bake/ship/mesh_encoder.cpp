@@ -110,7 +110,7 @@ std::vector<std::byte> squeeze(const std::vector<std::byte>& bytes, int level) {
   return packed;
 }
 
-/// Encodes one chunk: what Draco carries, and what travels beside it.
+/// Encodes one chunk: the part in Draco, and the part sent next to it.
 class MeshObjectMaker {
  public:
   MeshObjectMaker(std::span<const std::byte> vertices, std::span<const std::uint16_t> indices,
@@ -255,8 +255,8 @@ class MeshObjectMaker {
   std::vector<std::vector<std::uint32_t>> order_;
 };
 
-/// Triangles of a chunk that choose the size of its octahedral map: whole chunks take 2.5 times the
-/// time of publishing for at most 0.1 % of the bytes (`modar ship publish`, four scans).
+/// Triangles of a chunk that choose the size of its octahedral map. More take time and save few
+/// bytes.
 constexpr std::size_t kSampleTriangles = 4000;
 
 /// The size of map that makes the object of a chunk's first triangles smallest.
@@ -351,7 +351,7 @@ std::optional<std::vector<std::byte>> encode_level(std::span<const std::uint16_t
   if (indices.empty() || indices.size() % 3 != 0) return std::nullopt;
   const std::size_t vertices = *std::max_element(indices.begin(), indices.end()) + std::size_t{1};
   // LevelOrderer puts any order right. Levels of scans and a terrain are 0.72 to 0.75 of what they
-  // are in its own: in strips, most triangles are beside the last one.
+  // are in its own: in strips, most triangles are next to the last one.
   std::vector<std::uint16_t> strips(indices.size());
   meshopt_optimizeVertexCacheStrip(strips.data(), indices.data(), indices.size(), vertices);
   std::vector<unsigned char> coded(meshopt_encodeIndexBufferBound(indices.size(), vertices));

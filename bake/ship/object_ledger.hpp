@@ -10,7 +10,7 @@
 
 namespace modar {
 
-/// Lies in the folder as `.objects`: an object a line with its size, time and inode when it was
+/// It is in the folder as `.objects`: an object a line with its size, time and inode when it was
 /// last read. Rot that leaves all three is found by verify_release() alone.
 class ObjectLedger {
  public:
@@ -21,7 +21,7 @@ class ObjectLedger {
   /// time and inode are those that were noted.
   bool holds(const ObjectId& id);
 
-  /// Notes the objects that holds() was asked about, and no others. Errors: kIo.
+  /// Notes the objects queried by holds(), and no others. Errors: kIo.
   [[nodiscard]] Result<void> save() const;
 
  private:

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <set>
 
+#include "bake/io/output.hpp"
 #include "bake/ship/release_folder.hpp"
 #include "formats/check.hpp"
 #include "modar/mapped_file.hpp"
@@ -13,9 +14,10 @@
 namespace modar {
 namespace {
 
-/// A good bundle, mapped.
+/// A good bundle, without what releases leave out.
 struct OpenBundle {
   MappedFile file;
+  std::vector<std::byte> trimmed;  ///< instead of the file
   BundleView view;
 };
 
@@ -25,8 +27,12 @@ Result<OpenBundle> open_bundle(const std::string& path) {
     return fail(ExitCode::kInvalidInput, "ship.bad-bundle", path, error,
                 "see `modar check " + path + "`, and bake it again");
   }
-  MODAR_ASSIGN(const auto view, BundleView::open(file.bytes()));
-  return OpenBundle{std::move(file), view};
+  MODAR_ASSIGN(auto view, BundleView::open(file.bytes()));
+  MODAR_ASSIGN(auto trimmed, trim_to_publish(view));
+  if (!trimmed.empty()) {
+    MODAR_ASSIGN(view, BundleView::open(trimmed));
+  }
+  return OpenBundle{std::move(file), std::move(trimmed), view};
 }
 
 ReleaseBundle describe(const std::string& name, const PublishedBundle& made) {
@@ -111,7 +117,8 @@ Result<void> check_bundles(const PublishRequest& request) {
 Result<void> check_devices(const PublishRequest& request, const std::vector<ReleaseBundle>& kept) {
   for (const auto& [name, devices] : request.devices) {
     const bool published = std::ranges::any_of(
-        request.bundles, [&](const std::string& path) { return name_of(path) == name; });
+        request.bundles,
+        [called = name](const std::string& path) { return name_of(path) == called; });
     if (!published && find_bundle(kept, name) == nullptr) {
       return fail(ExitCode::kUsage, "ship.for", name, "the release has no such bundle",
                   "name one that it has");
@@ -146,7 +153,7 @@ Result<void> add_bundles(const PublishRequest& request, const ReleaseFolder& fol
   for (const std::string& path : request.bundles) {
     StageTimer timer(report, "publish " + path);
     MODAR_ASSIGN(const auto bundle, open_bundle(path));
-    MODAR_ASSIGN(const auto made, make_recipe(bundle.view, request.recipe));
+    MODAR_ASSIGN(const auto made, bundle.file.settle(make_recipe(bundle.view, request.recipe)));
     if (!request.dry_run) {
       MODAR_ASSIGN(const auto added, folder.add_objects(made, ledger));
       done.added_bytes += added;
@@ -220,7 +227,7 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
   MODAR_ASSIGN(const auto newest, folder.newest());
   const std::vector<ReleaseBundle> before = newest ? newest->bundles : std::vector<ReleaseBundle>();
   PublishReport done;
-  MODAR_ASSIGN(const RootWord word, folder.root_word());
+  MODAR_ASSIGN(const RootMetadata word, folder.root_metadata());
   done.release.epoch = word.epoch;
   MODAR_ASSIGN(done.release.version, next_version(folder, word.epoch, request.version));
   done.release.expires = request.expires;

@@ -59,11 +59,8 @@ struct Link {
 std::span<const Link> links();
 const Link* find_link(std::string_view name);
 
-/// Instructions of modar-fetch for each byte that it installs (decoding, hashing, checking).
-/// Counted by callgrind on the release build for x86-64, installing from a folder into a new store,
-/// less the 22 million of starting up: geometry 353 (assets/models/bust.obj) and 314 (a grid of
-/// 45,000 triangles), textures 28, patterns 47 (assets/patterns/cover.png). The higher figures
-/// stand here; ARM is assumed to need as many.
+/// Instructions of modar-fetch per installed byte of geometry, counted by callgrind on x86-64. ARM
+/// is assumed to need as many.
 inline constexpr double kGeometryInstructions = 353;
 inline constexpr double kOtherInstructions = 47;
 

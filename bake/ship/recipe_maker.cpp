@@ -52,7 +52,7 @@ struct Draft {
   bool blocks = false;  ///< of ETC1
 };
 
-/// Where the vertices and indices of a chunk lie that may travel as a mesh object.
+/// The places of the vertices and indices of a chunk that may travel as a mesh object.
 struct ChunkPlace {
   std::uint64_t vertices = 0;  ///< byte in the bundle
   std::uint64_t vertex_bytes = 0;
@@ -119,7 +119,7 @@ struct Covered {
   std::uint64_t end = 0;
 };
 
-/// The stage table, but for feature twins that no first sight needs: they are most of a pattern.
+/// The stage table, but for feature twins that no preview needs: they are most of a pattern.
 std::vector<StageRange> recipe_stages(const BundleView& bundle) {
   std::vector<StageRange> stages = stage_ranges(bundle);
   std::set<std::uint64_t> late;

@@ -1,8 +1,10 @@
 #include "bake/ship/release_folder.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <chrono>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -57,6 +59,43 @@ std::vector<std::uint64_t> numbers_in(const fs::path& folder) {
   return numbers;
 }
 
+/// Removes what a publisher that was killed left: "NAME.PID.tmp". The folder is locked.
+void remove_leftovers(const std::string& path) {
+  std::vector<fs::path> leftovers;
+  std::error_code error;
+  for (const char* folder : {"", "/releases", "/keys", "/roots", "/objects"}) {
+    for (fs::recursive_directory_iterator it(path + folder, error), end; !error && it != end;
+         it.increment(error)) {
+      if (*folder == '\0') it.disable_recursion_pending();
+      const fs::path name = it->path().stem();  // without ".tmp"
+      const std::string process = name.extension().string();
+      if (it->path().extension() == ".tmp" && process.size() > 1 && !name.stem().empty() &&
+          process.find_first_not_of("0123456789", 1) == std::string::npos) {
+        leftovers.push_back(it->path());
+      }
+    }
+  }
+  for (const fs::path& leftover : leftovers) fs::remove(leftover, error);
+}
+
+/// Syncs the folders that lead to objects: a release is named only when all of its pieces would
+/// survive a power cut. Those that another process created, too, before it was killed.
+Result<void> sync_objects(const std::string& path) {
+  const fs::path root = fs::absolute(path).lexically_normal();
+  std::vector<fs::path> folders = {
+      root.has_filename() ? root.parent_path() : root.parent_path().parent_path(), root,
+      root / "objects"};
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(root / "objects", error)) {
+    if (entry.is_directory(error)) folders.push_back(entry.path());
+  }
+  for (const fs::path& folder : folders) {
+    if (sync_folder(folder.string())) continue;
+    return fail(ExitCode::kIo, "io.sync", folder.string(), std::strerror(errno), "check the disk");
+  }
+  return {};
+}
+
 }  // namespace
 
 ReleaseFolder::ReleaseFolder(std::string path, FolderLock lock)
@@ -69,6 +108,7 @@ Result<ReleaseFolder> ReleaseFolder::open(const std::string& path) {
   MODAR_ASSIGN(auto lock, FolderLock::take(path + "/.lock", {kExitLocked, "ship.locked", path,
                                                              "another publisher is using it",
                                                              "wait until it ends"}));
+  remove_leftovers(path);
   return ReleaseFolder(path, std::move(lock));
 }
 
@@ -102,9 +142,9 @@ std::int64_t ReleaseFolder::published(std::uint64_t version) const {
   return std::chrono::duration_cast<std::chrono::seconds>(system.time_since_epoch()).count();
 }
 
-Result<RootWord> ReleaseFolder::root_word() const {
+Result<RootMetadata> ReleaseFolder::root_metadata() const {
   const auto text = read_text(path_ + "/root.json");
-  return text ? parse_root_word(*text) : RootWord{};
+  return text ? parse_root_metadata(*text) : RootMetadata{};
 }
 
 Result<void> ReleaseFolder::check_signer(const PublicKey& key) const {
@@ -114,11 +154,11 @@ Result<void> ReleaseFolder::check_signer(const PublicKey& key) const {
                     ", which devices would refuse",
                 "use that secret key, or move devices to yours: `modar ship rotate`");
   };
-  MODAR_ASSIGN(const RootWord word, root_word());
-  const std::uint32_t links = key_links();
+  MODAR_ASSIGN(const RootMetadata word, root_metadata());
+  const std::uint32_t links = key_rotations();
   if (links > word.links) {
     const std::string path = path_ + "/keys/" + std::to_string(links) + ".json";
-    MODAR_ASSIGN(const KeyLink link, parse_key_link(read_text(path).value_or("")));
+    MODAR_ASSIGN(const KeyRotation link, parse_key_rotation(read_text(path).value_or("")));
     MODAR_ASSIGN(const PublicKey last, parse_public_key(link.key));
     return last == key ? Result<void>() : refuse(last.id);
   }
@@ -142,7 +182,7 @@ Result<Release> ReleaseFolder::release(std::uint64_t version) const {
   return parse_release(*text);
 }
 
-std::uint32_t ReleaseFolder::key_links() const {
+std::uint32_t ReleaseFolder::key_rotations() const {
   const auto numbers = numbers_in(path_ + "/keys");
   return numbers.empty() ? 0 : static_cast<std::uint32_t>(numbers.back());
 }
@@ -211,13 +251,14 @@ Result<void> ReleaseFolder::add_release(const Release& release, std::int64_t now
   const std::string path = path_ + "/releases/" + number + ".json";
   const std::string text = release_text(release);
   const std::string signature = sign(key, text, "modar release " + number);
+  MODAR_TRY(sync_objects(path_));
   return write_file(path + ".minisig", std::string_view(signature))
       .and_then([&] { return write_file(path, std::string_view(text)); })
       .and_then([&] { return add_freshness(release, now, key); })
       .and_then([&] { return write_file(path_ + "/latest", std::string_view(number + "\n")); });
 }
 
-std::uint32_t ReleaseFolder::root_links() const {
+std::uint32_t ReleaseFolder::root_rotations() const {
   const auto numbers = numbers_in(path_ + "/roots");
   return numbers.empty() ? 0 : static_cast<std::uint32_t>(numbers.back());
 }
@@ -250,15 +291,16 @@ Result<void> ReleaseFolder::add_signed(
   return write_file(file.string(), std::string_view(text));
 }
 
-Result<RootWord> ReleaseFolder::add_root_word(const PublicKey& next, const SecretKey& root) const {
+Result<RootMetadata> ReleaseFolder::add_root_metadata(const PublicKey& next,
+                                                      const SecretKey& root) const {
   const std::string path = path_ + "/root.json";
-  MODAR_ASSIGN(RootWord word, root_word());
+  MODAR_ASSIGN(RootMetadata word, root_metadata());
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(path_, error)) {
     const std::string name = entry.path().filename().string();
     const bool several =
         name.starts_with("root.json.") && name.ends_with(".minisig") && name != "root.json.minisig";
-    if (!several && root_links() == 0) continue;
+    if (!several && root_rotations() == 0) continue;
     return fail(ExitCode::kUsage, "ship.root", path_, "several root keys must agree here",
                 "write a draft for all to sign: `modar ship root --draft FILE`");
   }
@@ -273,9 +315,9 @@ Result<RootWord> ReleaseFolder::add_root_word(const PublicKey& next, const Secre
     }
   }
   ++word.epoch;
-  word.links = key_links();
+  word.links = key_rotations();
   word.key = public_key_line(next);
-  const std::string text = root_word_text(word);
+  const std::string text = root_metadata_text(word);
   const std::string signature = sign(root, text, "modar root " + std::to_string(word.epoch));
   MODAR_TRY(write_file(path + ".minisig", std::string_view(signature)));
   MODAR_TRY(write_file(path, std::string_view(text)));
@@ -283,9 +325,9 @@ Result<RootWord> ReleaseFolder::add_root_word(const PublicKey& next, const Secre
 }
 
 Result<void> ReleaseFolder::add_key(const PublicKey& next, const SecretKey& key) const {
-  const KeyLink link{key_links() + 1, public_key_line(next)};
+  const KeyRotation link{key_rotations() + 1, public_key_line(next)};
   const std::string path = path_ + "/keys/" + std::to_string(link.serial) + ".json";
-  const std::string text = key_link_text(link);
+  const std::string text = key_rotation_text(link);
   const std::string signature = sign(key, text, "modar key " + std::to_string(link.serial));
   return write_file(path + ".minisig", std::string_view(signature)).and_then([&] {
     return write_file(path, std::string_view(text));

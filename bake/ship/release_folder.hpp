@@ -8,7 +8,7 @@
 //                                root.json.KEY.minisig each
 //   roots/S.json, S.json.KEY.minisig  the chain of root keys
 //   objects/ab/abcdef...         pieces and recipes, by the BLAKE2b of their bytes
-//   .objects, .lock              the publisher's own: what was read before; who is at work
+//   .objects, .lock              the publisher's own: earlier reads; who is at work
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,7 @@ namespace modar {
 /// Holds the lock of the folder: one publisher at a time.
 class ReleaseFolder {
  public:
-  /// Creates what is missing. Errors: kIo; kExitLocked "ship.locked".
+  /// Creates missing parts. Errors: kIo; kExitLocked "ship.locked".
   static Result<ReleaseFolder> open(const std::string& path);
 
   /// Numbers of the releases, by epoch, then ascending.
@@ -39,11 +39,11 @@ class ReleaseFolder {
   [[nodiscard]] std::int64_t published(std::uint64_t version) const;
   [[nodiscard]] Result<Release> release(std::uint64_t version) const;
   /// Number of links in the chain of keys.
-  [[nodiscard]] std::uint32_t key_links() const;
-  /// The root's word; epoch 0: none.
-  [[nodiscard]] Result<RootWord> root_word() const;
-  /// Refuses a key that is not the one devices have been led to: by the chain, by the root's word,
-  /// by the newest release. Errors: kUsage "ship.key".
+  [[nodiscard]] std::uint32_t key_rotations() const;
+  /// The root metadata; epoch 0: none.
+  [[nodiscard]] Result<RootMetadata> root_metadata() const;
+  /// Refuses a key that is not the one devices have been led to: by the chain, by the root
+  /// metadata, by the newest release. Errors: kUsage "ship.key".
   [[nodiscard]] Result<void> check_signer(const PublicKey& key) const;
 
   /// Writes the objects that are missing or hold other bytes; returns the bytes written.
@@ -56,12 +56,12 @@ class ReleaseFolder {
   /// Signs that the release is the newest at this time (seconds since 1970), and for the days that
   /// its document says. Writes nothing where that says none.
   Result<void> add_freshness(const Release& release, std::int64_t now, const SecretKey& key) const;
-  /// Writes the root's word: `next` signs from now on, and a new epoch begins.
+  /// Writes the root metadata: `next` signs from now on, and a new epoch begins.
   /// Errors: kUsage "ship.root" (another key than that of the word before, or several keys have to
   /// agree).
-  Result<RootWord> add_root_word(const PublicKey& next, const SecretKey& root) const;
+  Result<RootMetadata> add_root_metadata(const PublicKey& next, const SecretKey& root) const;
   /// Number of links in the chain of root keys.
-  [[nodiscard]] std::uint32_t root_links() const;
+  [[nodiscard]] std::uint32_t root_rotations() const;
   /// The root keys that the chain leads to from those that devices were given.
   /// Errors: kExitWrongKey "signature.too-few"; kInvalidInput "release.*".
   [[nodiscard]] Result<RootSet> roots(const RootSet& trust) const;

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostKeyBytes = 4096;  // of a signature, a link, the root's word
+constexpr std::size_t kMostKeyBytes = 4096;  // of a signature, a link, the root metadata
 constexpr std::uint32_t kMostLinks = 1000;   // as modar-fetch follows
 
 tl::unexpected<Error> absent(const std::string& path) {
@@ -37,14 +37,14 @@ Result<std::optional<SignedText>> read_signed(const ReleaseReader& read, const s
   return std::optional<SignedText>({std::move(*text), parsed});
 }
 
-/// Where the root's word leads to from the trusted key, and the chain of keys from there.
+/// Where the root metadata leads to from the trusted key, and the chain of keys from there.
 struct Trust {
   PublicKey key;
   std::uint64_t epoch = 0;
   std::uint32_t links = 0;
 };
 
-Result<void> follow_root_word(const ReleaseReader& read, const RootSet& roots, Trust& trust) {
+Result<void> follow_root_metadata(const ReleaseReader& read, const RootSet& roots, Trust& trust) {
   const std::string path = "root.json";
   MODAR_ASSIGN(const auto text, read(path, kMostKeyBytes));
   if (!text && trust.key != PublicKey()) return {};
@@ -57,7 +57,7 @@ Result<void> follow_root_word(const ReleaseReader& read, const RootSet& roots, T
       return read(signature, kMostKeyBytes);
     }));
   }
-  MODAR_ASSIGN(const auto word, parse_root_word(*text));
+  MODAR_ASSIGN(const auto word, parse_root_metadata(*text));
   MODAR_ASSIGN(trust.key, parse_public_key(word.key));
   trust.epoch = word.epoch;
   trust.links = word.links;
@@ -72,7 +72,7 @@ Result<void> follow_links(const ReleaseReader& read, Trust& trust) {
     ++trust.links;
     if (document->signature.key_id != trust.key.id) continue;
     MODAR_TRY(verify_signature(document->text, document->signature, trust.key));
-    MODAR_ASSIGN(const auto link, parse_key_link(document->text));
+    MODAR_ASSIGN(const auto link, parse_key_rotation(document->text));
     if (link.serial != trust.links) {
       return fail(kExitMixed, "ship.chain", path, "it is a different link of the chain",
                   "publish the chain of keys again");
@@ -193,11 +193,11 @@ Result<RootSet> follow_root_chain(const ReleaseReader& read, const RootSet& trus
     return read(path, kMostKeyBytes);
   };
   for (std::uint32_t serial = 1; serial <= kMostLinks; ++serial) {
-    const std::string path = root_link_path(serial);
+    const std::string path = root_rotation_path(serial);
     MODAR_ASSIGN(const auto text, read(path, kMostKeyBytes));
     if (!text) break;
     MODAR_TRY(verify_root_signatures(path, *text, roots, signature));
-    MODAR_ASSIGN(auto link, parse_root_link(*text));
+    MODAR_ASSIGN(auto link, parse_root_rotation(*text));
     if (link.serial != serial) {
       return fail(kExitMixed, "ship.chain", path, "it is a different link of the chain",
                   "publish the chain of root keys again");
@@ -215,7 +215,7 @@ Result<Trust> follow_keys(const ReleaseReader& read, const RootSet& trusted) {
   MODAR_ASSIGN(const RootSet roots, follow_root_chain(read, trusted));
   // Several root keys sign no releases: which key does is said in root.json.
   Trust trust{trusted.keys.size() == 1 ? trusted.keys.front() : PublicKey()};
-  MODAR_TRY(follow_root_word(read, roots, trust));
+  MODAR_TRY(follow_root_metadata(read, roots, trust));
   MODAR_TRY(follow_links(read, trust));
   return trust;
 }

@@ -1,4 +1,4 @@
-// Proves a release folder, or a mirror of one, whole: every document and object as it was signed.
+// Proves a release folder, or a mirror of one, whole: every signed document and object.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,7 @@
 
 namespace modar {
 
-/// A file below a release folder, which must not be longer than `limit` bytes; nothing where there
-/// is none.
+/// A file below a release folder, which must not be longer than `limit` bytes; nothing if none.
 using ReleaseReader =
     std::function<Result<std::optional<std::string>>(const std::string& path, std::size_t limit)>;
 
@@ -36,14 +35,14 @@ struct DamagedObject {
 
 struct VerifyReport {
   Release release;  ///< the newest
-  PublicKey key;    ///< signed it: where the root's word and the chain lead from the given one
+  PublicKey key;    ///< signed it: where the root metadata and the chain lead from the given one
   std::uint64_t objects = 0;
   std::uint64_t bytes = 0;  ///< of the objects that are whole
   std::vector<DamagedObject> damaged;
 };
 
 /// Reads what a device without a state would read, and every object of the newest release.
-/// `progress` is told the part that is done, 0 to 1.
+/// `progress` receives the finished part, 0 to 1.
 /// Errors: those of the reader; kExitWrongKey; kExitMixed; kInvalidInput "release.*".
 Result<VerifyReport> verify_release(const ReleaseReader& read, const RootSet& trusted,
                                     const std::function<void(double)>& progress);

@@ -7,10 +7,8 @@
 namespace modar {
 namespace {
 
-/// A triangle that spans more repeats than this along an axis counts as if it showed its whole
-/// bounding box: more rows than that would be walked for few texels. Less covers more than is
-/// shown, more costs time on scenes whose floors repeat a texture in long strips. Scans, whose
-/// textures do not repeat, have the same bytes with 2 to 8.
+/// Repeats along an axis above which a triangle covers its whole bounding box. Lower covers too
+/// much, higher takes time on repeating floors. [2, 8]
 constexpr double kMaxRepeats = 4;
 
 using Corners = std::array<std::array<double, 2>, 3>;
@@ -21,13 +19,13 @@ struct Span {
   std::int64_t last = 0;
 };
 
-/// Cuts the span to the texels of row y that do not lie wholly outside of the edge from a to b;
+/// Cuts the span to the texels of row y that are not wholly outside the edge from a to b;
 /// `side` is the sign of the triangle's area.
 void cut_by_edge(const std::array<double, 2>& a, const std::array<double, 2>& b, double side,
                  std::int64_t y, Span& span) {
   const double nx = (a[1] - b[1]) * side;
   const double ny = (b[0] - a[0]) * side;
-  // Of the square at (x, y), the corner that lies farthest inside.
+  // Of the square at (x, y), the corner farthest inside.
   const double best_y = ny * (static_cast<double>(ny > 0 ? y + 1 : y) - a[1]);
   const auto outside = [&](std::int64_t x) {
     return nx * (static_cast<double>(nx > 0 ? x + 1 : x) - a[0]) + best_y < 0;

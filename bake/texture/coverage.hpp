@@ -29,17 +29,17 @@ void cover_triangle(CoverageMask& mask, const std::array<std::array<double, 2>, 
 CoverageMask resize_coverage(const CoverageMask& mask, std::uint32_t width, std::uint32_t height);
 
 /// Fills texels that are not covered with the colours around them, nearest levels of a pyramid
-/// first (pull-push, Gortler et al., "The Lumigraph", 1996), so that no filter brings in what no
-/// triangle shows. mask has the image's size; one without any covered texel changes nothing.
+/// first (pull-push, Gortler et al., "The Lumigraph", 1996), so that no filter mixes in texels that
+/// no triangle shows. mask has the image's size; one without any covered texel changes nothing.
 void fill_uncovered(RgbaImage& image, const CoverageMask& mask);
 
 /// Gives texels of alpha 0 the colours around them, weighted by alpha, in the same way: hidden
 /// colours reach visible texels through mips and through the blocks that they share. An image
-/// without any visible texel stays as it is.
+/// without any visible texel stays unchanged.
 void fill_transparent(RgbaImage& image);
 
-/// Paints blocks of 4x4 texels that lie more than one texel away from all that is covered in the
-/// mean colour of what is: they all become the same 8 bytes.
+/// Paints blocks of 4x4 texels that are more than one texel away from all covered texels in the
+/// mean colour of those: they all become the same 8 bytes.
 void flatten_uncovered_blocks(RgbaImage& image, const CoverageMask& mask);
 
 }  // namespace modar

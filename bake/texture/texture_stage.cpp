@@ -12,9 +12,8 @@
 namespace modar {
 namespace {
 
-/// Side of coverage masks, whatever the image's. Finer ones leave fewer texels uncovered that only
-/// share a mask texel with shown ones, and cost four times the time and memory a step. A bundle of
-/// a scan with five photos has the same bytes with 512 to 2,048.
+/// Side of coverage masks, in texels. Finer ones mark fewer hidden texels as shown; each doubling
+/// takes four times the time. [512, 2048]
 constexpr std::uint32_t kCoverageSide = 1024;
 
 std::uint32_t use_of(const std::string& path, bool repeat, TextureUses& textures) {
@@ -159,14 +158,14 @@ std::uint32_t affordable_side(const TextureUses& textures, const TextureOptions&
 
 namespace {
 
-/// One unreadable picture of many is no reason to refuse a model: grey stands in for it.
+/// One unreadable picture of many is no reason to refuse a model: grey replaces it.
 Result<Texture> bake_use(const TextureUse& use, const TextureOptions& options, Report& report) {
   if (use.image) return bake_texture(*use.image, use.path, options, report);
   Result<Texture> texture = bake_texture(use.path, options, report);
   if (texture || texture.error().exit == ExitCode::kUsage) return texture;
   const Error& error = texture.error();
   report.diagnostics.push_back({error.code, DiagnosticSeverity::kWarning, error.where, 0,
-                                error.cause + "; grey stands in for it", error.cure});
+                                error.cause + "; grey replaces it", error.cure});
   return bake_texture(RgbaImage{1, 1, {128, 128, 128, 255}}, use.path, options, report);
 }
 

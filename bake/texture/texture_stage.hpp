@@ -60,13 +60,13 @@ std::uint64_t planned_bytes(std::span<const TexturePlan> textures, const Texture
 std::uint32_t plan_max_side(std::span<const TexturePlan> textures, const TextureOptions& options,
                             std::uint64_t budget);
 
-/// The greatest side under which all files of the uses fit into `budget` bytes beside the pages of
+/// The greatest side under which all files of the uses fit into `budget` bytes next to the pages of
 /// atlases, which keep their sides; options.max_side where the budget is 0. Files that cannot be
 /// read take nothing.
 std::uint32_t affordable_side(const TextureUses& textures, const TextureOptions& options,
                               std::uint64_t budget);
 
-/// What became of a use: a texture of the bundle, or one colour that stands for it.
+/// What became of a use: a texture of the bundle, or one colour that represents it.
 struct TextureOutcome {
   std::uint32_t texture = kNone;
   std::uint32_t side = 0;  ///< pixels of the longer side of level 0; 0: no texture
@@ -76,7 +76,7 @@ struct TextureOutcome {
 
 /// Bakes each use once, keeps identical results once, folds constant ones to their colour. budget:
 /// bytes that all of them together may take on the GPU, 0: any; the greatest side is lowered for
-/// it, but for pages of an atlas, which keep theirs. Grey stands in for a file that cannot be read,
+/// it, but for pages of an atlas, which keep theirs. Grey replaces a file that cannot be read,
 /// with a warning. Errors: those of bake_texture().
 Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,
                                                   TextureOptions options, std::uint64_t budget,

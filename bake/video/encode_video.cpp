@@ -8,12 +8,12 @@
 namespace modar {
 namespace {
 
-constexpr double kMostSeconds = 3600;  // longer ones were never meant to stand on a picture
+constexpr double kMostSeconds = 3600;  // longer ones were never meant for a picture
 
 tl::unexpected<Error> unreadable(const std::string& path, const char* what = "video") {
   return fail(ExitCode::kInvalidInput, "video.decode", path,
               std::string("FFmpeg reads no ") + what + " from it",
-              "`ffprobe FILE` says what is wrong with it");
+              "`ffprobe FILE` reports its faults");
 }
 
 Result<void> need_ffmpeg() {
@@ -24,7 +24,9 @@ Result<void> need_ffmpeg() {
 
 Result<std::vector<std::byte>> read_bytes(const std::string& path) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
-  return std::vector<std::byte>(file.bytes().begin(), file.bytes().end());
+  std::vector<std::byte> bytes(file.bytes().begin(), file.bytes().end());
+  MODAR_TRY(file.intact());
+  return bytes;
 }
 
 bool known_sound(const Mp4Info& info) {

@@ -24,9 +24,10 @@ struct EncodedMedia {
   Mp4Info info;
 };
 
-/// A file that is fit already, as it is; else encoded anew, with its sides and sound, deterministic
-/// for one version of FFmpeg. Errors: kIo "io.open"; kUnsupported "video.ffmpeg" where the program
-/// or its encoder libx264 is missing; kInvalidInput "video.decode" for what it reads no video from.
+/// A file that is fit already, unchanged; else encoded anew, with its sides and sound,
+/// deterministic for one version of FFmpeg. Errors: kIo "io.open"; kUnsupported "video.ffmpeg"
+/// where the program or its encoder libx264 is missing; kInvalidInput "video.decode" for what it
+/// reads no video from.
 Result<EncodedMedia> encode_video(const std::string& path, const VideoSize& most);
 /// The same of the first sound track of a file, without its pictures.
 Result<EncodedMedia> encode_sound(const std::string& path);
@@ -39,8 +40,8 @@ Result<void> check_sound(const std::string& path);
 /// Errors as above.
 Result<bool> flashes(const std::string& path);
 
-/// A WebVTT file as it is if it keeps the rules of captions.hpp; else what FFmpeg reads, SubRip for
-/// one, as such. Errors: kIo "io.open"; kInvalidInput "captions.read".
+/// A WebVTT file unchanged if it keeps the rules of captions.hpp; else what FFmpeg reads, SubRip
+/// for one, as such. Errors: kIo "io.open"; kInvalidInput "captions.read".
 Result<std::string> read_captions(const std::string& path);
 
 /// Writes the first picture of a video as a PNG file. Errors as above.

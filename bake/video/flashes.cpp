@@ -1,6 +1,6 @@
 // Flashes by WCAG 2.3.1: pairs of opposite changes of relative luminance by a tenth or more of the
 // greatest, where the darker picture is below 0.8; dangerous are more than three in a second on a
-// quarter of what is seen at once. A video on a picture fills a phone's screen at most.
+// quarter of the visible area. A video on a picture fills a phone's screen at most.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -59,7 +59,7 @@ Result<bool> flashes(const std::string& path) {
   std::ifstream frames(raw, std::ios::binary);
   if (read != 0 || !frames) {
     return fail(ExitCode::kInvalidInput, "video.decode", path, "FFmpeg reads no video from it",
-                "`ffprobe FILE` says what is wrong with it");
+                "`ffprobe FILE` reports its faults");
   }
   std::vector<Cell> cells(kCells);
   std::array<char, kCells> frame{};

@@ -1,4 +1,4 @@
-// Video files on the workstation. OpenCV's reader of videos maps 200 libraries, so it lies in a
+// Video files on the workstation. OpenCV's reader of videos maps 200 libraries, so it is in a
 // library of its own that is loaded when the first video is opened: `modar --version` maps few.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Writes a file beside its place, syncs it and renames it over the old one.
+// Writes a file next to its place, syncs it and renames it over the old one.
 #include "formats/base/atomic_file.hpp"
 
 #include <fcntl.h>
@@ -10,6 +10,8 @@
 #include <cstdio>
 #include <cstring>
 #include <utility>
+
+#include "formats/base/lost_pages.hpp"
 
 namespace modar {
 namespace {
@@ -23,17 +25,10 @@ std::string reason(const char* deed, int number) {
 /// A rename is durable once the folder that holds the names is synced too.
 bool sync_folder_of(const std::string& path) {
   const std::size_t slash = path.rfind('/');
-  const std::string folder =
-      slash == std::string::npos ? "." : path.substr(0, slash == 0 ? 1 : slash);
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return false;
-  // Some file systems cannot sync a folder and say EINVAL; there is nothing more to do there.
-  const bool synced = ::fsync(descriptor) == 0 || errno == EINVAL;
-  ::close(descriptor);
-  return synced;
+  return sync_folder(slash == std::string::npos ? "." : path.substr(0, slash == 0 ? 1 : slash));
 }
 
-/// Where a symbolic link leads to, so that the link stays; the path itself where it is none.
+/// Where a symbolic link leads to, so that the link stays; the path itself if it is no link.
 std::string followed(const std::string& path) {
   std::string target = path;
   for (int links = 0; links < kMostLinks; ++links) {
@@ -43,12 +38,40 @@ std::string followed(const std::string& path) {
     text.resize(static_cast<std::size_t>(length));
     const std::size_t slash = target.rfind('/');
     const bool relative = !text.starts_with('/') && slash != std::string::npos;
-    target = relative ? target.substr(0, slash + 1) + text : text;
+    target.resize(relative ? slash + 1 : 0);
+    target += text;
   }
   return path;  // links in a circle: opening it says so
 }
 
 }  // namespace
+
+bool sync_folder(const std::string& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return false;
+  // Some file systems cannot sync a folder and say EINVAL; there is nothing more to do there.
+  const bool synced = ::fsync(descriptor) == 0 || errno == EINVAL;
+  ::close(descriptor);
+  return synced;
+}
+
+const char* cure_of_writing(int number) {
+  switch (number) {
+    case ENOSPC:
+    case EDQUOT:
+      return "make room on the disk and try again";
+    case EFBIG:
+      return "use a disk whose file system takes files of this size";
+    case EIO:
+      return "check the disk";
+    case EINVAL:
+    case EILSEQ:
+    case ENAMETOOLONG:
+      return "rename the file: the disk's file system does not take its name";
+    default:
+      return "check that the folder exists and may be written";
+  }
+}
 
 AtomicFile::AtomicFile(int descriptor, std::string path, std::string temporary)
     : descriptor_(descriptor), path_(std::move(path)), temporary_(std::move(temporary)) {}
@@ -66,7 +89,7 @@ AtomicFile::~AtomicFile() {
 Result<AtomicFile> AtomicFile::create(const std::string& path) {
   const auto refused = [&path] {
     return fail(ExitCode::kIo, "io.create", path, reason("cannot create the file", errno),
-                "check that the folder exists and may be written");
+                cure_of_writing(errno));
   };
   const std::string target = followed(path);
   struct stat old {};
@@ -84,8 +107,8 @@ Result<AtomicFile> AtomicFile::create(const std::string& path) {
       ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666);
   if (descriptor < 0) return refused();
   if (there) {
-    // As the file that is replaced. Only its owner or root may give it away; others go on as
-    // themselves, as an editor does.
+    // As the file that is replaced. Only its owner or root may give it away; others are replaced
+    // themselves, as editors do.
     [[maybe_unused]] const int given = ::fchown(descriptor, old.st_uid, old.st_gid);
     const bool moded = ::fchmod(descriptor, old.st_mode & 07777) == 0;
     // FAT and the like have no modes of their own.
@@ -106,7 +129,7 @@ Result<void> AtomicFile::write(std::span<const std::byte> bytes) {
     if (written < 0) {
       if (errno == EINTR) continue;
       return fail(ExitCode::kIo, "io.write", path_, reason("cannot write", errno),
-                  "make room on the disk and try again");
+                  cure_of_writing(errno));
     }
     bytes = bytes.subspan(static_cast<std::size_t>(written));
   }
@@ -120,6 +143,11 @@ Result<void> AtomicFile::commit() {
   };
   if (descriptor_ < 0) {
     return fail(ExitCode::kInternal, "io.commit", path_, "the file was committed before", "");
+  }
+  if (lost_mappings != 0) {
+    return fail(ExitCode::kIo, "io.changed", path_,
+                "an input was cut short or removed with its disk while it was read",
+                "try again; the old file, if there was one, is unchanged");
   }
   if (temporary_.empty()) {  // no regular file: there is nothing to sync and to rename
     if (::close(std::exchange(descriptor_, -1)) != 0) return failed("cannot close");

@@ -1,4 +1,4 @@
-// Every output is written beside its place, synced and renamed: a reader sees the old file or the
+// Every output is written next to its place, synced and renamed: a reader sees the old file or the
 // new one, never half of one.
 #pragma once
 
@@ -15,9 +15,8 @@ namespace modar {
 class AtomicFile {
  public:
   /// Creates "<path>.<pid>.tmp" in the folder of `path`, with the mode and, where that is allowed,
-  /// the owner of the file that it will replace. A symbolic link is followed to its target; what is
-  /// no regular file (/dev/null, a pipe) is opened and written to as it is.
-  /// Errors: kIo "io.create".
+  /// the owner of the file that it will replace. A symbolic link is followed to its target; special
+  /// files (/dev/null, a pipe) are opened and written directly. Errors: kIo "io.create".
   static Result<AtomicFile> create(const std::string& path);
   AtomicFile(AtomicFile&& other) noexcept;
   AtomicFile& operator=(AtomicFile&&) = delete;
@@ -27,7 +26,8 @@ class AtomicFile {
 
   /// Errors: kIo "io.write".
   Result<void> write(std::span<const std::byte> bytes);
-  /// Syncs the file, renames it over `path`, syncs the folder. Errors: kIo "io.commit".
+  /// Syncs the file, renames it over `path`, syncs the folder. Errors: kIo "io.commit";
+  /// kIo "io.changed" while a mapped input has lost pages (lost_pages.hpp).
   Result<void> commit();
 
  private:
@@ -36,6 +36,13 @@ class AtomicFile {
   std::string path_;
   std::string temporary_;
 };
+
+/// Syncs a folder, so that new and renamed files in it survive a power cut. False: see
+/// errno.
+bool sync_folder(const std::string& path);
+
+/// What a person can do where a file cannot be written, by errno.
+const char* cure_of_writing(int number);
 
 /// Writes a whole file through AtomicFile.
 Result<void> write_file(const std::string& path, std::string_view text);

@@ -11,7 +11,7 @@
 
 namespace modar {
 
-/// What a program of ours returns to the shell. Commands document their own codes from 10 up.
+/// The exit code of our programs. Commands document their own codes from 10 up.
 enum class ExitCode : int {
   kOk = 0,
   kUsage = 1,         ///< the command line is wrong
@@ -22,7 +22,7 @@ enum class ExitCode : int {
 };
 
 /// An error a person can act on. `code` is stable ("bundle.truncated"), `where` names the file with
-/// its line or byte offset, `cause` says what was found, `cure` what to do about it.
+/// its line or byte offset, `cause` states the finding, `cure` the remedy.
 struct Error {
   ExitCode exit = ExitCode::kInternal;
   std::string code;
@@ -51,7 +51,7 @@ inline tl::unexpected<Error> fail(ExitCode exit, std::string code, std::string w
   MODAR_ASSIGN_AS(MODAR_JOIN(modar_result_, __COUNTER__), declaration, (__VA_ARGS__))
 
 #define MODAR_JOIN(a, b) MODAR_JOIN_NOW(a, b)
-#define MODAR_JOIN_NOW(a, b) a##b
+#define MODAR_JOIN_NOW(a, b) a##b  // NOLINTBEGIN(bugprone-macro-parentheses): declarations
 #define MODAR_TRY_AS(result, expression)                                \
   do {                                                                  \
     if (auto result = expression; !result) {                            \
@@ -61,7 +61,7 @@ inline tl::unexpected<Error> fail(ExitCode exit, std::string code, std::string w
 #define MODAR_ASSIGN_AS(result, declaration, expression)                         \
   auto result = expression;                                                      \
   if (!result) return tl::unexpected<::modar::Error>(std::move(result).error()); \
-  declaration = std::move(*result)
+  declaration = std::move(*result)  // NOLINTEND(bugprone-macro-parentheses)
 
 /// One line for a terminal: "where: cause; cure [code]".
 inline std::string to_line(const Error& error) {

@@ -17,7 +17,8 @@ Result<FolderLock> FolderLock::take(const std::string& file, const Error& busy) 
     return fail(ExitCode::kIo, "io.create", file, std::strerror(errno),
                 "check that the folder is writable");
   }
-  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
+  // A file system that has no locks, as some network shares, is used without.
+  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     ::close(descriptor);
     return tl::unexpected(busy);
   }

@@ -6,7 +6,7 @@
 
 namespace modar {
 
-/// The text as it stands in an element or in a quoted attribute.
+/// The text escaped for an element or a quoted attribute.
 inline std::string escape_html(std::string_view text) {
   std::string html;
   html.reserve(text.size());

@@ -40,7 +40,7 @@ std::string_view nearest_name(std::string_view word, const Names& names) {
   return nearest;
 }
 
-/// The cure of an error about a name that is none of these.
+/// The cure of an error about a name that is not one of these.
 template <class Names>
 std::string cure_of_name(std::string_view word, const Names& names) {
   const std::string_view nearest = nearest_name(word, names);

@@ -1,5 +1,5 @@
-// printf rounds correctly and strtod reads correctly in every C library that we build for: what is
-// left is to try one digit more until the number reads back.
+// printf rounds correctly and strtod reads correctly in every C library that we build for:
+// otherwise one digit more is tried until the number reads back.
 #include "formats/base/shortest_number.hpp"
 
 #include <array>
@@ -34,7 +34,7 @@ Decimal rounded(double value, int digits) {
   const std::string_view all(text.data());
   const std::size_t exponent = all.find('e');
   Decimal decimal;
-  // What is no digit is the locale's decimal point.
+  // Any other character is the locale's decimal point.
   for (const char letter : all.substr(0, exponent)) {
     if (is_digit(letter)) decimal.digits += letter;
   }
@@ -52,7 +52,7 @@ bool reads_back(const Decimal& decimal, T value) {
 template <class T>
 Decimal fewest_digits(T value) {
   constexpr int kExact = 17;  // digits tell any double apart
-  // Below a power of two numbers lie twice as densely: the decimal above may be further off, and
+  // Below a power of two numbers are twice as dense: the decimal above may be further off, and
   // read back all the same.
   int exponent = 0;
   const bool power_of_two = std::frexp(value, &exponent) == T(0.5);
@@ -107,15 +107,6 @@ std::string shortest_text(float value) {
 
 std::string shortest_text(double value) {
   return shortest(value);
-}
-
-std::string scientific_text(double value, int digits) {
-  std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%.*e", digits, value);
-  const std::string_view all(text.data());
-  const std::size_t first = all.find_first_of("0123456789");
-  const std::size_t second = all.find_first_of("0123456789", first + 1);
-  return std::string(all.substr(0, first + 1)) + "." + std::string(all.substr(second));
 }
 
 }  // namespace modar

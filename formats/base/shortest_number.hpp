@@ -11,8 +11,4 @@ namespace modar {
 std::string shortest_text(float value);
 std::string shortest_text(double value);
 
-/// Digits in scientific notation, `digits` behind the point ("1.250e+01"), in no locale.
-/// value: finite; digits: 1 to 16.
-std::string scientific_text(double value, int digits);
-
 }  // namespace modar

@@ -8,7 +8,7 @@
 
 namespace modar {
 
-/// Bytes of the character that starts at text[0] (1-4), or 0 where there is none: ill-formed
+/// Bytes of the character that starts at text[0] (1-4), or 0 if invalid: ill-formed
 /// (Unicode 15, table 3-7) or a control character (U+0000-001F, U+007F-009F).
 inline std::size_t utf8_character(std::string_view text) {
   const auto at = [&text](std::size_t i) {
@@ -19,7 +19,7 @@ inline std::size_t utf8_character(std::string_view text) {
   if (first < 0x80) return first >= 0x20 && first != 0x7F ? 1 : 0;
   if (first < 0xC2 || first > 0xF4 || !tail(1)) return 0;
   if (first < 0xE0) return first == 0xC2 && at(1) < 0xA0 ? 0 : 2;
-  // The second byte excludes overlong forms, surrogates and what lies beyond U+10FFFF.
+  // The second byte excludes overlong forms, surrogates and values beyond U+10FFFF.
   if ((first == 0xE0 && at(1) < 0xA0) || (first == 0xED && at(1) > 0x9F) ||
       (first == 0xF0 && at(1) < 0x90) || (first == 0xF4 && at(1) > 0x8F) || !tail(2)) {
     return 0;

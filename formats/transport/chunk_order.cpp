@@ -13,8 +13,8 @@ namespace {
 
 /// Entries of the cache that is planned for: the smallest that phones of the class have.
 constexpr std::uint32_t kCacheSize = 16;
-/// Vertices are sorted by their first bits, three digits of so many, then compared where these are
-/// the same: 33 bits hold two of a position's 16-bit coordinates.
+/// Vertices are sorted by their first bits, three digits of this many, then compared where these
+/// are the same: 33 bits hold two of a position's 16-bit coordinates.
 constexpr unsigned kDigitBits = 11;
 constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
 constexpr std::uint64_t kOut = ~std::uint64_t{0};  ///< no corners: they have 48 bits

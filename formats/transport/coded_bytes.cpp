@@ -246,7 +246,7 @@ class PictureModel {
   std::array<int, kTaps> around_{};
   std::array<int, kPredictors> guesses_{};
   Bias* bias_ = nullptr;
-  // Of the pixel at x_: grays around it by the compass, and what is made of them.
+  // Of the pixel at x_: greys around it by the compass, and values made of them.
   int w_ = 0, n_ = 0, nw_ = 0, ne_ = 0, ww_ = 0, nn_ = 0;
   int miss_w_ = 0, miss_n_ = 0;
   int mean_ = 0;

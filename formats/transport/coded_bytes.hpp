@@ -1,5 +1,5 @@
-// Bytes and gray pictures as ContextCoder's decisions: what first visits bring (PieceForm::kCoded,
-// kTrackerRecord). formats/shipping.md is the normative text.
+// Bytes and gray pictures as ContextCoder's decisions: bytes that first visits download
+// (PieceForm::kCoded, kTrackerRecord). formats/shipping.md is the normative text.
 #pragma once
 
 #include <cstddef>

@@ -5,16 +5,14 @@
 namespace modar {
 namespace {
 
-/// Of the mixed predictions, so that they sum to twice of what one of them says: the best of 0.2 to
-/// 0.3 on the pictures of assets/patterns, by 0.2 %.
+/// Initial weight of the mixed predictions. [0.2, 0.3]
 constexpr std::int32_t kFirstWeight = 65536 / 5;
-/// How fast weights follow, in 65536ths of error times input. 2, 6 and 14: 109.8, 111.8 and 117.6
-/// KB for the picture of a pattern.
+/// Rate at which weights follow, in fractions of error times input. Higher is less exact. [2, 14]
 constexpr std::int64_t kLearning = 2;
-/// Decisions after which a slot follows no slower: 60 cost 0.1 %, 1000 gained nothing.
+/// Decisions after which a slot follows no slower.
 constexpr std::uint32_t kMostCount = 255;
 /// Predictions are held this far from certainty, of 65536.
-constexpr int kLeast = 16;
+constexpr int kMinProbability = 16;
 
 }  // namespace
 
@@ -109,7 +107,8 @@ bool ContextCoder::code(bool decision, std::uint32_t node, std::size_t first, st
   }
   for (std::size_t m = 0; m < 2; ++m) mixes[m].probability = table.squashed(sums[m] >> 16);
   const int mixed = table.squashed((sums[0] + sums[1]) >> 17);
-  decision = split(decision, static_cast<std::uint32_t>(std::clamp(mixed, kLeast, 65536 - kLeast)));
+  decision = split(decision, static_cast<std::uint32_t>(
+                                 std::clamp(mixed, kMinProbability, 65536 - kMinProbability)));
   for (Mix& mix : mixes) learn(mix, decision);
   for (std::uint32_t* slot : hits_) {
     const std::uint32_t count = *slot & 1023;

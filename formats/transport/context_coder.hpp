@@ -17,7 +17,7 @@ class ContextCoder {
  public:
   static constexpr std::size_t kContexts = 9;
 
-  /// An encoder. weight_sets: numbers of sets that code() is told.
+  /// An encoder. weight_sets: numbers of sets that code() receives.
   explicit ContextCoder(std::size_t weight_sets);
   /// A decoder of those bytes, which must outlive it.
   ContextCoder(std::size_t weight_sets, std::span<const std::byte> coded);

@@ -1,98 +1,66 @@
 #include "formats/transport/feature_text.hpp"
 
 #include <array>
-#include <charconv>
-#include <cmath>
+#include <cstdlib>
 
 #include "formats/base/shortest_number.hpp"
 
 namespace modar {
 namespace {
 
-constexpr std::size_t kWrapMargin = 71;  ///< a line that would grow past it is broken
-constexpr std::size_t kLeastLine = 10;   ///< but never for fewer characters than that
+/// OpenCV's base64 data begin with their element format, padded with blanks: "1u" is one byte.
+constexpr std::string_view kElementFormat = "1u                      ";
+constexpr std::size_t kLineBytes = 48;  ///< of data in a line of base64: 64 characters
 
-/// An integer as it is, another number with 17 digits, as FileStorage tells them apart: "31.".
+/// Fewest digits that a reader which takes doubles and rounds to float reads back; with a point or
+/// an exponent, so that it is no integer: "31.".
 std::string number(float value) {
-  std::array<char, 40> text{};
-  char* end = text.data();
-  if (std::abs(value) < 2147483648.0f && std::nearbyint(value) == value) {
-    end = std::to_chars(end, text.data() + text.size(), static_cast<std::int64_t>(value)).ptr;
-    *end++ = '.';
-  } else {
-    return scientific_text(static_cast<double>(value), 16);
+  std::string text = shortest_text(value);
+  if (static_cast<float>(std::strtod(text.c_str(), nullptr)) != value) {
+    text = shortest_text(static_cast<double>(value));
   }
-  return {text.data(), end};
+  return text.find_first_of(".e") == std::string::npos ? text + "." : text;
 }
 
-/// A list in brackets, broken into lines.
-class FlowList {
- public:
-  FlowList(std::string& out, std::size_t indent) : out_(out), indent_(indent) { out_ += '['; }
-
-  void add(std::string_view item) {
-    if (!empty_) out_ += ',';
-    const std::size_t column = out_.size() - line_begin() + item.size();
-    if (column > kWrapMargin && column - indent_ > kLeastLine) {
-      out_ += '\n';
-      out_.append(indent_, ' ');
-    } else {
-      out_ += ' ';
-    }
-    out_ += item;
-    empty_ = false;
-  }
-  void close() { out_ += empty_ ? "]\n" : " ]\n"; }
-
- private:
-  [[nodiscard]] std::size_t line_begin() {
-    while (true) {
-      const std::size_t next = out_.find('\n', line_begin_);
-      if (next == std::string::npos) return line_begin_;
-      line_begin_ = next + 1;
-    }
-  }
-
-  std::string& out_;
-  std::size_t indent_;
-  std::size_t line_begin_ = 0;
-  bool empty_ = true;
-};
-
 void add_keypoint(std::string& out, const KeypointRecord& point) {
-  out += "   - ";
-  FlowList list(out, 7);
+  out += "   - [ ";
   for (const float value : {point.x, point.y, point.size, point.angle, point.response}) {
-    list.add(number(value));
+    out += number(value) + ", ";
   }
-  list.add(std::to_string(point.octave));
-  list.add(std::to_string(point.class_id));
-  list.close();
+  out += std::to_string(point.octave) + ", " + std::to_string(point.class_id) + " ]\n";
+}
+
+/// Base64 of RFC 4648, in lines.
+void add_base64(std::string& out, std::string_view bytes) {
+  constexpr const char* kLetters =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  for (std::size_t at = 0; at < bytes.size(); at += 3) {
+    if (at % kLineBytes == 0) out += "\n      ";
+    std::uint32_t three = 0;
+    for (std::size_t i = at; i < at + 3; ++i) {
+      three = three << 8 | (i < bytes.size() ? static_cast<unsigned char>(bytes[i]) : 0u);
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+      out += at + i > bytes.size() ? '=' : kLetters[three >> (18 - 6 * i) & 63];
+    }
+  }
+  out += '\n';
 }
 
 }  // namespace
 
 std::string feature_text(const FeatureView& features) {
-  std::string out = "%YAML:1.0\n---\n";
-  if (features.keypoints.empty()) {
-    out += "keypoints: []\n";
-  } else {
-    out += "keypoints:\n";
-    for (const KeypointRecord& point : features.keypoints) {
-      std::string text;
-      add_keypoint(text, point);
-      out += text;
-    }
-  }
+  std::string out = "%YAML:1.0\n---\nkeypoints:";
+  out += features.keypoints.empty() ? " []\n" : "\n";
+  for (const KeypointRecord& point : features.keypoints) add_keypoint(out, point);
   out += "descriptors: !!opencv-matrix\n   rows: " + std::to_string(features.keypoints.size()) +
          "\n   cols: " + std::to_string(features.descriptor_bytes) + "\n   dt: u\n   data: ";
-  std::string text = "   data: ";
-  FlowList list(text, 7);
-  for (const std::byte value : features.descriptors) {
-    list.add(std::to_string(std::to_integer<unsigned>(value)));
-  }
-  list.close();
-  return out + text.substr(9);
+  if (features.descriptors.empty()) return out + "[]\n";
+  std::string data(kElementFormat);
+  data.append(reinterpret_cast<const char*>(features.descriptors.data()),
+              features.descriptors.size());
+  add_base64(out += "!!binary |", data);
+  return out;
 }
 
 }  // namespace modar

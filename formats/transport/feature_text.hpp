@@ -1,5 +1,5 @@
-// The YML text of a pattern's features, generated from the mapped ones: byte for byte what OpenCV's
-// FileStorage writes for them, so that the text need not be downloaded.
+// The YML text of a pattern's features, made from the mapped ones, so that it need not be
+// downloaded.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace modar {
 
-/// OpenCV FileStorage YML with the nodes "keypoints" and "descriptors". Whether a stored text
-/// equals it is for the caller to see: other versions of OpenCV may break lines elsewhere.
+/// OpenCV FileStorage YML with the nodes "keypoints" (a vector of KeyPoint) and "descriptors" (a
+/// matrix, in OpenCV's base64 form). Keypoints have the fewest digits that read back bit for bit.
 std::string feature_text(const FeatureView& features);
 
 }  // namespace modar

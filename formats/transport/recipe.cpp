@@ -26,7 +26,7 @@ bool fits(std::uint64_t offset, std::uint64_t size, std::uint64_t limit) {
   return offset <= limit && size <= limit - offset;
 }
 
-/// What is wrong with a piece, or nullptr.
+/// The fault of a piece, or nullptr.
 const char* fault_of(const PieceRecord& piece, std::uint64_t bundle_size, std::uint32_t version) {
   const auto form = static_cast<PieceForm>(piece.form);
   const PieceForm last = version == 1 ? PieceForm::kLevel : PieceForm::kCoded;

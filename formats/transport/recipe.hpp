@@ -71,7 +71,7 @@ struct PieceRecord {
 };
 static_assert(sizeof(PieceRecord) == 64);
 
-/// A validated recipe: every range lies in the bundle, every size is in its limit. Bytes of the
+/// A validated recipe: every range is in the bundle, every size is in its limit. Bytes of the
 /// bundle that no piece covers are zero. Points into the caller's bytes.
 struct RecipeView {
   RecipeHeader header{};

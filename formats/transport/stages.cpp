@@ -45,7 +45,7 @@ class Planner {
     }
   }
 
-  /// What is shown of the section, then the rest.
+  /// The shown part of the section, then the rest.
   void split(const SectionEntry& entry, std::uint32_t stride, std::vector<StageRange> shown) {
     std::sort(shown.begin(), shown.end(),
               [](const StageRange& a, const StageRange& b) { return a.offset < b.offset; });
@@ -92,6 +92,7 @@ LoadStage stage_of(SectionType type) {
     case SectionType::kMappedFeatures:
     case SectionType::kTrackerRecord:
     case SectionType::kPatternColours:
+    case SectionType::kPatternPicture:
     case SectionType::kPatternShape:
     // Opening a bundle reads these.
     case SectionType::kShadow:
@@ -102,9 +103,9 @@ LoadStage stage_of(SectionType type) {
   }
 }
 
-std::uint32_t coarsest_stand_in(const BundleView& bundle, std::uint32_t model) {
-  for (std::uint32_t i = bundle.stand_ins().size(); i-- > 0;) {
-    if (bundle.stand_ins()[i].model == model) return bundle.models().size() + i;
+std::uint32_t coarsest_proxy(const BundleView& bundle, std::uint32_t model) {
+  for (std::uint32_t i = bundle.proxies().size(); i-- > 0;) {
+    if (bundle.proxies()[i].model == model) return bundle.models().size() + i;
   }
   return kNone;
 }
@@ -132,8 +133,8 @@ std::vector<StageRange> shown_blocks(const BundleView& bundle, std::uint32_t num
 std::vector<StageRange> shown_geometry(const BundleView& bundle, bool indices) {
   std::vector<StageRange> shown;
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
-    const std::uint32_t stand_in = coarsest_stand_in(bundle, m);
-    const ChunkGroup group = bundle.chunk_group(stand_in == kNone ? m : stand_in);
+    const std::uint32_t proxy = coarsest_proxy(bundle, m);
+    const ChunkGroup group = bundle.chunk_group(proxy == kNone ? m : proxy);
     const std::uint32_t vertex = bundle.layouts()[bundle.models()[m].layout].stride;
     for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
       const ChunkRecord& chunk = bundle.chunks()[group.first_chunk + c];
@@ -192,11 +193,11 @@ std::vector<StageRange> kept_ranges(const BundleView& bundle) {
   return kept;
 }
 
-void use_stand_ins(std::span<std::byte> bytes, const BundleView& bundle) {
+void use_proxies(std::span<std::byte> bytes, const BundleView& bundle) {
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
-    const std::uint32_t stand_in = coarsest_stand_in(bundle, m);
-    if (stand_in == kNone) continue;
-    const ChunkGroup group = bundle.chunk_group(stand_in);
+    const std::uint32_t proxy = coarsest_proxy(bundle, m);
+    if (proxy == kNone) continue;
+    const ChunkGroup group = bundle.chunk_group(proxy);
     ModelRecord& model = writable(bytes, bundle, bundle.models()[m]);
     model.first_chunk = group.first_chunk;
     model.chunk_count = group.chunk_count;
@@ -213,10 +214,10 @@ void show_coarsest(std::span<std::byte> bytes, const BundleView& bundle) {
     texture.height = bundle.texture_levels()[texture.first_level].height;
   }
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
-    const std::uint32_t stand_in = coarsest_stand_in(bundle, m);
-    if (stand_in == kNone) continue;
+    const std::uint32_t proxy = coarsest_proxy(bundle, m);
+    if (proxy == kNone) continue;
     // As exact as can be, and cheaper than chunks of their finest levels: chosen from everywhere.
-    const ChunkGroup coarse = bundle.chunk_group(stand_in);
+    const ChunkGroup coarse = bundle.chunk_group(proxy);
     for (std::uint32_t c = 0; c < coarse.chunk_count; ++c) {
       const ChunkRecord& chunk = bundle.chunks()[coarse.first_chunk + c];
       writable(bytes, bundle, bundle.levels()[chunk.first_level]).error = 0.0f;

@@ -16,7 +16,7 @@ namespace modar {
 /// third of a phone's screen shows, for a sixteenth of the bytes of 1024.
 inline constexpr std::uint32_t kShownSide = 256;
 
-/// Types of sections from here on are payloads; what lies before them are tables and small text.
+/// Types of sections from here on are payloads; before them are tables and small text.
 inline constexpr std::uint32_t kFirstPayload = 256;
 
 /// And from here on they are what GPUs draw from: vertices, indices, texture blocks.
@@ -27,16 +27,16 @@ struct StageRange {
   std::uint64_t offset = 0;  ///< in the bundle
   std::uint64_t size = 0;
   LoadStage stage = LoadStage::kRefine;
-  std::uint32_t stride = 1;  ///< of what lies there: vertices, triangles, blocks
+  std::uint32_t stride = 1;  ///< of the bytes there: vertices, triangles, blocks
 };
 
 /// All of a bundle but the zeros between sections, in the order of need. It reads tables only.
 std::vector<StageRange> stage_ranges(const BundleView& bundle);
 
-/// Where a bundle's vertices, indices and texture blocks begin: all else lies before.
+/// Where a bundle's vertices, indices and texture blocks begin: all else is before.
 std::uint64_t gpu_start(const BundleView& bundle);
 
-/// Of bytes that begin at `offset`, those that lie in the `size` ones from `start` on, and where
+/// Of bytes beginning at `offset`, those that are in the `size` ones from `start` on, and where
 /// there; both count from the same place.
 struct Overlap {
   std::uint64_t at = 0;
@@ -48,8 +48,8 @@ Overlap overlap(std::uint64_t start, std::uint64_t size, std::uint64_t offset,
 /// Of a payload other than vertices, indices and texture blocks, which are of several.
 LoadStage stage_of(SectionType type);
 
-/// The coarsest stand-in of a model as a number of a chunk group; kNone where it has none.
-std::uint32_t coarsest_stand_in(const BundleView& bundle, std::uint32_t model);
+/// The coarsest proxy of a model as a number of a chunk group; kNone where it has none.
+std::uint32_t coarsest_proxy(const BundleView& bundle, std::uint32_t model);
 
 /// The level of a texture, counted from its finest, from which on LoadStage::kShow shows it.
 std::uint32_t first_shown_level(const BundleView& bundle, const TextureRecord& texture);
@@ -57,23 +57,23 @@ std::uint32_t first_shown_level(const BundleView& bundle, const TextureRecord& t
 /// The levels of a texture that LoadStage::kShow shows: bytes from the start of its section.
 std::vector<StageRange> shown_blocks(const BundleView& bundle, std::uint32_t texture);
 
-/// Of each model its coarsest stand-in, or all of it where it has none, which LoadStage::kShow
+/// Of each model its coarsest proxy, or all of it where it has none, which LoadStage::kShow
 /// shows: bytes from the start of the section of indices or vertices. Unsorted, some more than
 /// once.
 std::vector<StageRange> shown_geometry(const BundleView& bundle, bool indices);
 
 /// What a program needs to have in memory when vertices, indices and texture blocks are on the GPU:
-/// all that lies before them, what LoadStage::kShow shows, and the indices that a draw order sorts.
+/// all that is before them, what LoadStage::kShow shows, and the indices that a draw order sorts.
 /// Some bytes more than once; `stage` means nothing.
 std::vector<StageRange> kept_ranges(const BundleView& bundle);
 
-/// Gives each model that has stand-ins the chunks of the coarsest one in place of its own, for what
+/// Gives each model that has proxies the chunks of the coarsest one in place of its own, for what
 /// reads the triangles of kept_ranges(). bytes: those that `bundle` is a view of. The caller keeps
 /// a copy of the section of models.
-void use_stand_ins(std::span<std::byte> bytes, const BundleView& bundle);
+void use_proxies(std::span<std::byte> bytes, const BundleView& bundle);
 
 /// Changes the tables of a bundle of which the last stage is missing, so that renderers made of it
-/// draw nothing of that: stand-ins in place of all chunks, textures from kShownSide on. bytes:
+/// draw nothing of that: proxies in place of all chunks, textures from kShownSide on. bytes:
 /// those that `bundle` is a view of. The caller keeps a copy of the tables for when the rest is
 /// there.
 void show_coarsest(std::span<std::byte> bytes, const BundleView& bundle);

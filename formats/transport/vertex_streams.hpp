@@ -34,8 +34,8 @@ std::array<std::int8_t, 3> snorm8_of_octahedral(std::int32_t s, std::int32_t t, 
 /// The direction at a point of the map; its absolute values add up to 2^(bits-1) - 1.
 std::array<std::int32_t, 3> octahedral_direction(std::int32_t s, std::int32_t t, int bits);
 
-/// The direction of the map that decodes to exactly these bytes or, if there is none near the
-/// normal, to the nearest ones. bits: 2 to 16.
+/// The direction of the map that decodes to exactly these bytes or, if none is near the normal, to
+/// the nearest ones. bits: 2 to 16.
 std::array<std::int32_t, 3> octahedral_of_snorm8(std::array<std::int8_t, 3> bytes, int bits);
 
 /// Semantic of the byte that OcclusionRecord names, where it travels; a layout has no such
@@ -45,9 +45,9 @@ inline constexpr std::uint8_t kTravellingOcclusion = 255;
 /// How one attribute of a layout travels.
 struct VertexStream {
   enum class Kind : std::uint8_t {
-    kHalfPosition,  ///< HalfParts: coarse steps in the codec, fine bits beside it
+    kHalfPosition,  ///< HalfParts: coarse steps in the codec, fine bits next to it
     kPosition,      ///< integers in the codec
-    kNormal,        ///< octahedral in the codec, corrections of the three bytes beside it
+    kNormal,        ///< octahedral in the codec, corrections of the three bytes next to it
     kUv,            ///< integers in the codec
     kOther,         ///< integers in the codec
   };

@@ -46,7 +46,7 @@ bool needs_no_library(PieceForm form) {
 /// Zeros; untouched where they are zeros already, so that pages without pieces take no memory.
 std::byte* zeros(std::size_t size) {
 #ifdef __EMSCRIPTEN__
-  // Its calloc() writes them. What lies beyond the heap's end is zeros.
+  // Its calloc() writes them. Bytes beyond the heap's end are zeros.
   const auto* const end = static_cast<const std::byte*>(sbrk(0));
   auto* bytes = static_cast<std::byte*>(std::malloc(size));
   if (bytes != nullptr && bytes < end) {

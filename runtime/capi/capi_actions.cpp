@@ -74,7 +74,8 @@ int modar_node_at(const modar_bundle* bundle, uint32_t index, modar_node* node) 
                {place[0], place[1], place[2]},
                (record.flags & modar::kNodeHidden) != 0 ? 1 : 0,
                modar::plays_media(record) ? record.subject + 1 : 0,
-               (record.flags & modar::kNodeLoops) != 0 ? 1 : 0},
+               (record.flags & modar::kNodeLoops) != 0 ? 1 : 0,
+               0},
               node);
   return 1;
 }
@@ -85,7 +86,7 @@ int modar_media_at(const modar_bundle* bundle, uint32_t index, modar_media* medi
   const std::span<const std::byte> bytes = bundle->view.media_data(index);
   modar::give(
       {0, static_cast<int>(record.width), static_cast<int>(record.height),
-       static_cast<double>(record.seconds), (record.flags & modar::kMediaSound) != 0 ? 1 : 0,
+       (record.flags & modar::kMediaSound) != 0 ? 1 : 0, static_cast<double>(record.seconds),
        reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()},
       media);
   return 1;
@@ -129,7 +130,7 @@ size_t modar_node_text(const modar_bundle* bundle, uint32_t index, int kind, con
 
 size_t modar_node_caption(const modar_bundle* bundle, uint32_t index, const char* language,
                           double seconds, char* text, size_t size) {
-  if (index >= modar_node_count(bundle) || language == nullptr) return 0;
+  if (index >= modar_node_count(bundle) || language == nullptr || !modar::usable(seconds)) return 0;
   const std::string captions = words_of(bundle, index, MODAR_CAPTIONS, language);
   const std::string words =
       seconds < 0 ? modar::transcript(captions) : modar::words_at(captions, seconds);
@@ -142,7 +143,7 @@ size_t modar_action_address(const modar_bundle* bundle, uint32_t action, char* t
 }
 
 modar_actions* modar_actions_create(const modar_bundle* bundle, modar_error* error) {
-  if (bundle == nullptr) return modar::no_handle(modar::missing("bundle"), error);
+  if (bundle == nullptr) return modar::fail_null(modar::missing("bundle"), error);
   auto made = std::make_unique<modar_actions>(
       modar_actions{bundle->view, modar::ActionMachine(bundle->view), {}, {}, {}});
   made->events.reserve(bundle->view.patterns().size() + 2 * bundle->view.nodes().size());
@@ -162,7 +163,7 @@ void modar_actions_reset(modar_actions* actions) {
 
 size_t modar_actions_step(modar_actions* actions, double time_s, const modar_event* events,
                           size_t count) {
-  if (actions == nullptr) return 0;
+  if (actions == nullptr || !modar::usable(time_s)) return 0;
   actions->events.clear();
   count = modar::item_count(events, count);
   for (size_t i = 0; i < count; ++i) {
@@ -180,7 +181,7 @@ size_t modar_actions_step(modar_actions* actions, double time_s, const modar_eve
 int modar_actions_command(const modar_actions* actions, size_t index, modar_command* command) {
   if (actions == nullptr || index >= actions->commands.size()) return 0;
   const modar::SceneCommand& ours = actions->commands[index];
-  modar::give({0, static_cast<int>(ours.command), ours.node, ours.action}, command);
+  modar::give({0, static_cast<int>(ours.command), ours.node, ours.action, 0}, command);
   return 1;
 }
 
@@ -195,7 +196,7 @@ int modar_actions_waiting(const modar_actions* actions) {
 size_t modar_actions_items(modar_actions* actions, uint32_t pattern, const float view[16],
                            modar_item* items, size_t capacity) {
   capacity = modar::item_count(items, capacity);
-  if (actions == nullptr || view == nullptr || capacity == 0) return 0;
+  if (actions == nullptr || view == nullptr || capacity == 0 || !modar::usable(view, 16)) return 0;
   actions->items.clear();
   modar::add_items(actions->view, actions->machine, pattern, glm::make_mat4(view), actions->items);
   const size_t count = std::min(capacity, actions->items.size());
@@ -215,27 +216,28 @@ size_t modar_actions_items(modar_actions* actions, uint32_t pattern, const float
   return count;
 }
 
-int modar_label_project(const modar_actions* actions, uint32_t node, const modar_camera* camera,
-                        const float view[16], const modar_item* items, size_t count,
-                        modar_label* label) {
-  if (!has_node(actions, node) || camera == nullptr || view == nullptr || label == nullptr) {
+int modar_label_project(const modar_actions* actions, uint32_t node, const modar_drawing* drawing,
+                        const float view[16], modar_label* label) {
+  if (!has_node(actions, node) || drawing == nullptr || view == nullptr || label == nullptr) {
     return 0;
   }
+  const modar_drawing drawn = modar::grown(*drawing);
+  if (!modar::usable(drawn) || drawn.camera == nullptr || !modar::usable(view, 16)) return 0;
   const modar::NodeRecord& record = actions->view.nodes()[node];
   if (record.kind != static_cast<uint32_t>(modar::NodeKind::kLabel) ||
       !actions->machine.shown(node)) {
     return 0;
   }
   const glm::vec4 point(record.place[0], record.place[1], record.place[2], 1.0f);
-  const modar::Camera ours = modar::camera_of(*camera);
+  const modar::Camera ours = modar::camera_of(*drawn.camera);
   modar_label found{};
   if (!project(ours, glm::vec3(glm::make_mat4(view) * point), found)) return 0;
   const modar_bundle bundle{{}, {}, actions->view};
   auto hit = modar::sized<modar_hit>();
-  // What lies nearer than 98 % of the way covers the point: a label stands on its surface.
+  // Surfaces nearer than 98 % of the way cover the point: a label is on its own surface.
   constexpr float kNearer = 0.98f;
-  found.covered = modar_pick(&bundle, camera, static_cast<double>(found.x),
-                             static_cast<double>(found.y), items, count, &hit) != 0 &&
+  found.covered = modar_pick(&bundle, drawing, static_cast<double>(found.x),
+                             static_cast<double>(found.y), &hit) != 0 &&
                           hit.distance < kNearer * found.distance
                       ? 1
                       : 0;

@@ -2,6 +2,7 @@
 // Nothing of the tracker and nothing of the renderer: what both halves share.
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <iterator>
 #include <limits>
 #include <string>
@@ -18,21 +19,52 @@
 #include "modar/renderer.hpp"
 #include "runtime/capi/handles.hpp"
 
+// `size` tells a caller of another version only if an appended member makes the structure longer.
+#define MODAR_ENDS_WITH(type, last) \
+  static_assert(sizeof(type) == offsetof(type, last) + sizeof(type::last), "padding at the end")
+MODAR_ENDS_WITH(modar_error, reserved);
+MODAR_ENDS_WITH(modar_scene, reserved);
+MODAR_ENDS_WITH(modar_camera, distortion);
+MODAR_ENDS_WITH(modar_picture, chroma_step);
+MODAR_ENDS_WITH(modar_pose, reserved);
+MODAR_ENDS_WITH(modar_tracker_options, reserved);
+MODAR_ENDS_WITH(modar_turntable, zoom);
+MODAR_ENDS_WITH(modar_item, node);
+MODAR_ENDS_WITH(modar_drawing, item_count);
+MODAR_ENDS_WITH(modar_render_stats, bytes_uploaded);
+MODAR_ENDS_WITH(modar_render_options, reserved);
+MODAR_ENDS_WITH(modar_surface, keep_depth);
+MODAR_ENDS_WITH(modar_hit, reserved);
+MODAR_ENDS_WITH(modar_node, reserved);
+MODAR_ENDS_WITH(modar_media, byte_count);
+MODAR_ENDS_WITH(modar_event, reserved);
+MODAR_ENDS_WITH(modar_command, reserved);
+MODAR_ENDS_WITH(modar_label, covered);
+#undef MODAR_ENDS_WITH
+
 using modar::copy_name;
-using modar::hand_over;
-using modar::no_handle;
+using modar::fail_null;
+using modar::set_error;
+using modar::usable;
 
 namespace {
 
 // modar_orbit(): the field of view across the smaller side, in radians, as from a hand's distance;
-// and room around what is shown, as the page's turntable has them.
+// and room around the content, as the page's turntable has them.
 constexpr double kOrbitField = 0.6981317007977318;
 constexpr double kOrbitMargin = 1.06;
 
-modar_bundle* opened(modar::MappedFile file, std::span<const std::byte> bytes, modar_error* error) {
-  auto view = modar::BundleView::open(bytes);
-  if (!view) return no_handle(view.error(), error);
-  return new modar_bundle{std::move(file), {}, *view};
+modar_bundle* opened(modar::Result<modar::MappedFile> file, modar_error* error) {
+  if (!file) return fail_null(file.error(), error);
+  const auto view = modar::open_bundle(*file);
+  if (!view) return fail_null(view.error(), error);
+  return new modar_bundle{std::move(*file), {}, *view};
+}
+
+modar_bundle* opened(std::span<const std::byte> bytes, modar_error* error) {
+  const auto view = modar::BundleView::open(bytes);
+  if (!view) return fail_null(view.error(), error);
+  return new modar_bundle{{}, {}, *view};
 }
 
 }  // namespace
@@ -45,34 +77,29 @@ uint32_t modar_version(void) {
 }
 
 modar_bundle* modar_bundle_open(const char* path, modar_error* error) {
-  if (path == nullptr) return no_handle(modar::missing("path"), error);
-  auto file = modar::MappedFile::open(path);
-  if (!file) return no_handle(file.error(), error);
-  const std::span<const std::byte> bytes = file->bytes();
-  return opened(std::move(*file), bytes, error);
+  if (path == nullptr) return fail_null(modar::missing("path"), error);
+  return opened(modar::MappedFile::open(path), error);
 }
 
 modar_bundle* modar_bundle_open_fd(int fd, int64_t offset, int64_t length, modar_error* error) {
   if (offset < 0 || length < 0)
-    return no_handle(
+    return fail_null(
         {modar::ExitCode::kUsage, "io.range", "offset", "is negative", "pass the asset's own"},
         error);
-  auto file = modar::MappedFile::open(fd, static_cast<std::uint64_t>(offset),
-                                      static_cast<std::uint64_t>(length));
-  if (!file) return no_handle(file.error(), error);
-  const std::span<const std::byte> bytes = file->bytes();
-  return opened(std::move(*file), bytes, error);
+  return opened(modar::MappedFile::open(fd, static_cast<std::uint64_t>(offset),
+                                        static_cast<std::uint64_t>(length)),
+                error);
 }
 
 modar_bundle* modar_bundle_open_bytes(const void* bytes, size_t size, modar_error* error) {
-  if (bytes == nullptr) return no_handle(modar::missing("bytes"), error);
+  if (bytes == nullptr) return fail_null(modar::missing("bytes"), error);
   const auto* first = static_cast<const std::byte*>(bytes);
   if (reinterpret_cast<std::uintptr_t>(bytes) % alignof(std::uint64_t) == 0)
-    return opened({}, {first, size}, error);
+    return opened(std::span(first, size), error);
   std::vector<std::uint64_t> copy(size / sizeof(std::uint64_t) + 1);
   std::memcpy(copy.data(), first, size);
   const std::span<const std::byte> aligned = std::as_bytes(std::span(copy)).first(size);
-  modar_bundle* bundle = opened({}, aligned, error);
+  modar_bundle* bundle = opened(aligned, error);
   if (bundle != nullptr) bundle->copy = std::move(copy);
   return bundle;
 }
@@ -82,8 +109,17 @@ void modar_bundle_close(modar_bundle* bundle) {
 }
 
 int modar_bundle_verify(const modar_bundle* bundle, modar_error* error) {
-  if (bundle == nullptr) return hand_over(modar::missing("bundle"), error);
-  return hand_over(modar::verify_sections(bundle->view), error);
+  if (bundle == nullptr) return set_error(modar::missing("bundle"), error);
+  return set_error(bundle->file.settle(modar::verify_sections(bundle->view)), error);
+}
+
+void modar_guard_files(void) {
+  modar::guard_mapped_files();
+}
+
+int modar_bundle_intact(const modar_bundle* bundle, modar_error* error) {
+  if (bundle == nullptr) return set_error(modar::missing("bundle"), error);
+  return set_error(bundle->file.intact(), error);
 }
 
 uint32_t modar_model_count(const modar_bundle* bundle) {
@@ -130,10 +166,10 @@ double modar_pattern_width_mm(const modar_bundle* bundle, uint32_t index) {
 
 int modar_camera_read(const char* path, modar_camera* camera, modar_error* error) {
   if (path == nullptr || camera == nullptr) {
-    return hand_over(modar::missing(path == nullptr ? "path" : "camera"), error);
+    return set_error(modar::missing(path == nullptr ? "path" : "camera"), error);
   }
   const auto read = modar::read_camera_yml(path);
-  if (!read) return hand_over(read.error(), error);
+  if (!read) return set_error(read.error(), error);
   modar::give_camera(*read, camera);
   return MODAR_OK;
 }
@@ -141,7 +177,7 @@ int modar_camera_read(const char* path, modar_camera* camera, modar_error* error
 int modar_scene_at(const modar_bundle* bundle, uint32_t index, modar_scene* scene) {
   if (index >= modar_scene_count(bundle) || scene == nullptr) return 0;
   const modar::SceneRecord& record = bundle->view.scenes()[index];
-  modar_scene ours{0, record.pattern, record.model, {}, index + 1};
+  modar_scene ours{0, record.pattern, record.model, {}, index + 1, 0};
   modar::copy_matrix(modar::scene_matrix(record), ours.place);
   modar::give(ours, scene);
   return 1;
@@ -230,11 +266,14 @@ void modar_camera_default(int width, int height, modar_camera* camera) {
   modar::give_camera(modar::default_camera(width, height), camera);
 }
 
-int modar_orbit(const modar_bundle* bundle, uint32_t pattern, double turn, double tilt, double zoom,
+int modar_orbit(const modar_bundle* bundle, uint32_t pattern, const modar_turntable* from,
                 modar_camera* camera, modar_pose* pose) {
-  if (pattern >= modar_pattern_count(bundle) || camera == nullptr || pose == nullptr) return 0;
+  if (pattern >= modar_pattern_count(bundle)) return 0;
+  if (from == nullptr || camera == nullptr || pose == nullptr) return 0;
+  const auto [size, turn, tilt, zoom] = modar::grown(*from);
   modar_camera lens = modar::grown(*camera);
   if (lens.width < 1 || lens.height < 1 || !(zoom > 0.0)) return 0;
+  if (!usable(turn) || !usable(tilt) || !usable(zoom) || !usable(1.0 / zoom)) return 0;
   const modar::PatternRecord& plane = bundle->view.patterns()[pattern];
   glm::vec3 low(-plane.half_width, -plane.half_height, 0.0f);
   glm::vec3 high = -low;
@@ -267,6 +306,7 @@ int modar_orbit(const modar_bundle* bundle, uint32_t pattern, double turn, doubl
 void modar_projection(const modar_camera* camera, double near_plane, double far_plane,
                       float projection[16]) {
   if (camera == nullptr || projection == nullptr) return;
+  if (!usable(*camera) || !usable(near_plane) || !usable(far_plane)) return;
   modar::copy_matrix(modar::gl_projection(modar::camera_of(*camera), near_plane, far_plane),
                      projection);
 }

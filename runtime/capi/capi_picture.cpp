@@ -28,11 +28,11 @@ std::uint8_t gray_of(const std::uint8_t* rgb) {
 
 int modar_gray(const modar_picture* picture, uint8_t* gray, modar_error* error) {
   if (picture == nullptr || gray == nullptr) {
-    return modar::hand_over(modar::missing(picture == nullptr ? "picture" : "gray"), error);
+    return modar::set_error(modar::missing(picture == nullptr ? "picture" : "gray"), error);
   }
   const modar_picture asked = modar::grown(*picture);
   if (const auto valid = modar::check_picture(asked); !valid) {
-    return modar::hand_over(valid.error(), error);
+    return modar::set_error(valid.error(), error);
   }
   const bool colour = asked.format == MODAR_RGB || asked.format == MODAR_RGBA;
   const std::size_t pixel = !colour ? 1 : asked.format == MODAR_RGB ? 3 : 4;

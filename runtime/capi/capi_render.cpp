@@ -17,6 +17,7 @@ struct modar_context {
 };
 
 struct modar_renderer {
+  const modar_bundle* bundle;
   modar::BundleView view;
   std::string device;
   std::uint64_t gpu_bytes = 0;
@@ -99,17 +100,18 @@ modar::SurfaceView surface_of(const modar_surface& surface) {
 /// A neutral room with its key light there; zeros: each scene's own light.
 void set_key(modar::RenderOptions& options, const float* direction) {
   const glm::vec3 to_light = glm::make_vec3(direction);
-  if (to_light == glm::vec3(0.0f)) return;
+  if (to_light == glm::vec3(0.0f) || !modar::usable(direction, 3)) return;
   options.light = modar::neutral_room();
   options.light->direction = to_light;
 }
 
-/// The items of models that there are, into the renderer's own list.
-void take_items(modar_renderer& renderer, const modar_item* items, size_t count) {
+/// The items of models that there are and whose numbers are usable, into the renderer's own list.
+void take_items(modar_renderer& renderer, const modar_drawing& drawing) {
   renderer.items.clear();
-  count = modar::item_count(items, count);
+  const size_t count = modar::item_count(drawing.items, drawing.item_count);
   for (size_t i = 0; i < count; ++i) {
-    const modar_item asked = modar::item_at(items, i);
+    const modar_item asked = modar::item_at(drawing.items, i);
+    if (!modar::usable(asked)) continue;
     const bool picture = modar::is_picture(renderer.view, asked.node - 1);
     if (!picture && asked.model >= renderer.view.models().size()) continue;
     modar::DrawItem item{picture ? modar::kNone : asked.model, glm::make_mat4(asked.to_eye),
@@ -123,12 +125,15 @@ void take_items(modar_renderer& renderer, const modar_item* items, size_t count)
 }
 
 /// The caller's, or the camera's with depth limits that enclose the items.
-glm::mat4 projection_of(const modar_renderer& renderer, const modar_camera* camera,
-                        const float* projection) {
-  if (projection != nullptr) return glm::make_mat4(projection);
-  if (camera == nullptr || renderer.items.empty()) return glm::mat4(1.0f);
+glm::mat4 projection_of(const modar_renderer& renderer, const modar_drawing& drawing) {
+  if (drawing.projection != nullptr) return glm::make_mat4(drawing.projection);
+  if (drawing.camera == nullptr || renderer.items.empty()) return glm::mat4(1.0f);
   const modar::DepthRange range = modar::depth_range(renderer.view, renderer.items);
-  return modar::gl_projection(modar::camera_of(*camera), range.near_plane, range.far_plane);
+  return modar::gl_projection(modar::camera_of(*drawing.camera), range.near_plane, range.far_plane);
+}
+
+modar_drawing drawing_of(const modar_drawing* drawing) {
+  return drawing == nullptr ? modar_drawing{} : modar::grown(*drawing);
 }
 
 /// Without a picture, the camera's size alone.
@@ -148,7 +153,7 @@ modar::CameraPicture frame_of(modar_renderer& renderer, const modar_picture* pic
 
 modar_context* modar_context_create(modar_error* error) {
   auto context = modar::GlContext::create_offscreen();
-  if (!context) return modar::no_handle(context.error(), error);
+  if (!context) return modar::fail_null(context.error(), error);
   return new modar_context{std::move(*context)};
 }
 
@@ -158,28 +163,30 @@ void modar_context_destroy(modar_context* context) {
 
 modar_renderer* modar_renderer_create(const modar_bundle* bundle, const char* device,
                                       uint64_t gpu_bytes, modar_error* error) {
-  if (bundle == nullptr) return modar::no_handle(modar::missing("bundle"), error);
+  if (bundle == nullptr) return modar::fail_null(modar::missing("bundle"), error);
   auto made = std::make_unique<modar_renderer>();
+  made->bundle = bundle;
   made->view = bundle->view;
   made->device = device == nullptr ? "" : device;
   made->gpu_bytes = gpu_bytes;
   const auto caps = caps_for(made->device, gpu_bytes);
-  if (!caps) return modar::no_handle(caps.error(), error);
-  auto renderer = modar::Renderer::create(bundle->view, *caps);
-  if (!renderer) return modar::no_handle(renderer.error(), error);
+  if (!caps) return modar::fail_null(caps.error(), error);
+  auto renderer = bundle->file.settle(modar::Renderer::create(bundle->view, *caps));
+  if (!renderer) return modar::fail_null(renderer.error(), error);
   made->renderer = std::move(*renderer);
   return made.release();
 }
 
 modar_renderer* modar_renderer_create_part(const modar_bundle* bundle, int part, uint64_t gpu_bytes,
                                            modar_error* error) {
-  if (bundle == nullptr) return modar::no_handle(modar::missing("bundle"), error);
+  if (bundle == nullptr) return modar::fail_null(modar::missing("bundle"), error);
   modar::GlCaps caps = modar::probe_gl_caps();
   caps.gpu_memory = gpu_bytes;
   auto renderer =
       modar::Renderer::create_part(bundle->view, caps, static_cast<modar::Renderer::Part>(part));
-  if (!renderer) return modar::no_handle(renderer.error(), error);
+  if (!renderer) return modar::fail_null(renderer.error(), error);
   auto made = std::make_unique<modar_renderer>();
+  made->bundle = bundle;
   made->view = bundle->view;
   made->renderer = std::move(*renderer);
   return made.release();
@@ -188,7 +195,7 @@ modar_renderer* modar_renderer_create_part(const modar_bundle* bundle, int part,
 uint32_t modar_renderer_open_wanted(modar_renderer* renderer, uint64_t* offset,
                                     uint64_t* byte_count) {
   if (renderer == nullptr) return 0;
-  const modar::Renderer::Wanted wanted = renderer->renderer->open_wanted();
+  const modar::Renderer::StreamRequest wanted = renderer->renderer->open_wanted();
   *offset = wanted.offset;
   *byte_count = wanted.size;
   return wanted.number + 1;
@@ -209,59 +216,53 @@ void modar_renderer_destroy(modar_renderer* renderer) {
 }
 
 int modar_renderer_restore(modar_renderer* renderer, modar_error* error) {
-  if (renderer == nullptr) return modar::hand_over(modar::missing("renderer"), error);
+  if (renderer == nullptr) return modar::set_error(modar::missing("renderer"), error);
   const auto caps = caps_for(renderer->device, renderer->gpu_bytes);
-  if (!caps) return modar::hand_over(caps.error(), error);
-  return modar::hand_over(renderer->renderer->restore(*caps), error);
+  if (!caps) return modar::set_error(caps.error(), error);
+  return modar::set_error(renderer->bundle->file.settle(renderer->renderer->restore(*caps)), error);
 }
 
 int modar_renderer_resize(modar_renderer* renderer, int width, int height, modar_error* error) {
-  if (renderer == nullptr) return modar::hand_over(modar::missing("renderer"), error);
+  if (renderer == nullptr) return modar::set_error(modar::missing("renderer"), error);
   const auto done = renderer->renderer->resize(width, height);
-  if (!done) return modar::hand_over(done, error);
+  if (!done) return modar::set_error(done, error);
   renderer->picture_bytes =
       std::size_t{4} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   return 0;
 }
 
-void modar_renderer_set_light(modar_renderer* renderer, const float direction[3], int exclusive) {
-  if (renderer == nullptr || direction == nullptr) return;
-  modar::RenderOptions options;
-  set_key(options, direction);
-  options.exclusive_context = exclusive != 0;
-  renderer->renderer->set_options(options);
-}
-
 void modar_renderer_render(modar_renderer* renderer, const modar_picture* picture,
-                           const modar_camera* camera, const float projection[16],
-                           const modar_item* items, size_t count) {
-  if (renderer == nullptr) return;
-  take_items(*renderer, items, count);
-  renderer->renderer->render(frame_of(*renderer, picture, camera),
-                             projection_of(*renderer, camera, projection), renderer->items);
+                           const modar_drawing* drawing) {
+  const modar_drawing asked = drawing_of(drawing);
+  if (renderer == nullptr || !modar::usable(asked)) return;
+  take_items(*renderer, asked);
+  renderer->renderer->render(frame_of(*renderer, picture, asked.camera),
+                             projection_of(*renderer, asked), renderer->items);
 }
 
 void modar_renderer_draw(modar_renderer* renderer, const modar_surface* surface,
-                         const modar_picture* picture, const modar_camera* camera,
-                         const float projection[16], const modar_item* items, size_t count) {
-  if (renderer == nullptr || surface == nullptr) return;
-  take_items(*renderer, items, count);
-  renderer->renderer->draw(surface_of(*surface), frame_of(*renderer, picture, camera),
-                           projection_of(*renderer, camera, projection), renderer->items);
+                         const modar_picture* picture, const modar_drawing* drawing) {
+  const modar_drawing asked = drawing_of(drawing);
+  if (renderer == nullptr || surface == nullptr || !modar::usable(asked)) return;
+  take_items(*renderer, asked);
+  renderer->renderer->draw(surface_of(*surface), frame_of(*renderer, picture, asked.camera),
+                           projection_of(*renderer, asked), renderer->items);
 }
 
 void modar_renderer_observe(modar_renderer* renderer, const modar_picture* picture,
-                            const modar_camera* camera, const modar_item* items, size_t count) {
-  if (renderer == nullptr || picture == nullptr) return;
+                            const modar_drawing* drawing) {
+  modar_drawing asked = drawing_of(drawing);
+  asked.projection = nullptr;
+  if (renderer == nullptr || picture == nullptr || !modar::usable(asked)) return;
   const modar::CameraPicture frame = picture_of(*picture, renderer->chroma);
   if (frame.width == 0) return;
-  take_items(*renderer, items, count);
-  renderer->renderer->observe(frame, projection_of(*renderer, camera, nullptr), renderer->items);
+  take_items(*renderer, asked);
+  renderer->renderer->observe(frame, projection_of(*renderer, asked), renderer->items);
 }
 
 void modar_surface_to_frame(const modar_surface* surface, const modar_camera* camera, double x,
                             double y, double* frame_x, double* frame_y) {
-  if (surface == nullptr || camera == nullptr) return;
+  if (surface == nullptr || camera == nullptr || !modar::usable(x) || !modar::usable(y)) return;
   const modar_camera asked = modar::grown(*camera);
   const glm::dvec2 pixel =
       modar::frame_pixel(surface_of(*surface), asked.width, asked.height, {x, y});
@@ -269,23 +270,28 @@ void modar_surface_to_frame(const modar_surface* surface, const modar_camera* ca
   if (frame_y != nullptr) *frame_y = pixel.y;
 }
 
-int modar_pick(const modar_bundle* bundle, const modar_camera* camera, double frame_x,
-               double frame_y, const modar_item* items, size_t count, modar_hit* hit) {
-  if (bundle == nullptr || camera == nullptr) return 0;
+int modar_pick(const modar_bundle* bundle, const modar_drawing* drawing, double frame_x,
+               double frame_y, modar_hit* hit) {
+  const modar_drawing drawn = drawing_of(drawing);
+  if (bundle == nullptr || drawn.camera == nullptr || !modar::usable(*drawn.camera)) return 0;
+  if (!modar::usable(frame_x) || !modar::usable(frame_y)) return 0;
   std::vector<modar::DrawItem> ours;
-  count = modar::item_count(items, count);
+  const size_t count = modar::item_count(drawn.items, drawn.item_count);
   for (size_t i = 0; i < count; ++i) {
-    const modar_item asked = modar::item_at(items, i);
+    const modar_item asked = modar::item_at(drawn.items, i);
+    if (!modar::usable(asked)) return 0;
     ours.push_back({asked.model, glm::make_mat4(asked.to_eye), modar::kNone, {}});
     ours.back().node = asked.node - 1;
   }
-  const auto found = modar::pick(bundle->view, modar::camera_of(*camera), {frame_x, frame_y}, ours);
+  const auto found =
+      modar::pick(bundle->view, modar::camera_of(*drawn.camera), {frame_x, frame_y}, ours);
   if (!found) return 0;
   modar::give({0,
                found->item,
                {found->point.x, found->point.y, found->point.z},
                found->distance,
-               found->material + 1},
+               found->material + 1,
+               0},
               hit);
   return 1;
 }
@@ -302,13 +308,19 @@ void modar_render_options_default(modar_render_options* options) {
                                     ours.lod_pixels,
                                     ours.exclusive_context ? 1 : 0,
                                     ours.estimate_light ? 0 : 1,
-                                    ours.samples};
+                                    ours.samples,
+                                    0};
   modar::give(filled, options);
 }
 
 void modar_renderer_set_options(modar_renderer* renderer, const modar_render_options* options) {
   if (renderer == nullptr || options == nullptr) return;
   const modar_render_options asked = modar::grown(*options);
+  const float numbers[] = {asked.light_strength, asked.ambient_strength, asked.lod_pixels};
+  if (!modar::usable(asked.light, 3) || !modar::usable(asked.clear_colour, 4) ||
+      !modar::usable(numbers, 3)) {
+    return;
+  }
   modar::RenderOptions ours;
   set_key(ours, asked.light);
   ours.light_strength = asked.light_strength;

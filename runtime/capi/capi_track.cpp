@@ -10,6 +10,17 @@
 #include "modar/pose_smoother.hpp"
 #include "runtime/capi/handles.hpp"
 
+static_assert(MODAR_REASON_VISIBLE == static_cast<int>(modar::Reason::kVisible));
+static_assert(MODAR_REASON_NO_FEATURES == static_cast<int>(modar::Reason::kNoFeatures));
+static_assert(MODAR_REASON_FEW_MATCHES == static_cast<int>(modar::Reason::kFewMatches));
+static_assert(MODAR_REASON_NOT_IN_VIEW == static_cast<int>(modar::Reason::kNoGeometry));
+static_assert(MODAR_REASON_FAILED_VERIFICATION ==
+              static_cast<int>(modar::Reason::kFailedVerification));
+static_assert(MODAR_REASON_LOST_BY_BLUR == static_cast<int>(modar::Reason::kLostByBlur));
+static_assert(MODAR_REASON_OUT_OF_VIEW == static_cast<int>(modar::Reason::kOutOfView));
+static_assert(MODAR_REASON_ANOTHER_PRINT == static_cast<int>(modar::Reason::kOtherPrint));
+static_assert(MODAR_REASON_CURVED == static_cast<int>(modar::Reason::kCurved));
+
 struct modar_tracker {
   const modar_bundle* bundle;
   modar::PoseLoopOptions options;
@@ -44,22 +55,19 @@ void set_pose(const modar::Pose& from, const glm::dmat4x3& stretch, modar_pose& 
 }  // namespace
 
 modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_camera* camera,
-                                    modar_error* error) {
-  const modar_tracker_options options = {sizeof options, 0, 0, 0.0, 0, 0, 0};
-  return modar_tracker_create_with(bundle, camera, &options, error);
-}
-
-modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar_camera* camera,
-                                         const modar_tracker_options* options, modar_error* error) {
-  if (bundle == nullptr || camera == nullptr || options == nullptr) {
-    const char* none = bundle == nullptr ? "bundle" : camera == nullptr ? "camera" : "options";
-    modar::hand_over(modar::missing(none), error);
-    return nullptr;
+                                    const modar_tracker_options* options, modar_error* error) {
+  if (bundle == nullptr || camera == nullptr) {
+    return modar::fail_null(modar::missing(bundle == nullptr ? "bundle" : "camera"), error);
   }
   const modar::Camera ours = modar::camera_of(*camera);
   if (const auto valid = modar::validate(ours); !valid)
-    return modar::no_handle(valid.error(), error);
-  const modar_tracker_options asked = modar::grown(*options);
+    return modar::fail_null(valid.error(), error);
+  const modar_tracker_options asked =
+      options == nullptr ? modar_tracker_options{} : modar::grown(*options);
+  if (!modar::usable(*camera)) return modar::fail_null(modar::bad_number("camera"), error);
+  if (!modar::usable(asked.smooth_ms)) {
+    return modar::fail_null(modar::bad_number("smooth_ms"), error);
+  }
   modar::PoseLoopOptions how;
   how.async_search = asked.async_search != 0;
   if (asked.search_every > 0) how.search_every = asked.search_every;
@@ -67,7 +75,7 @@ modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar
   how.extended = asked.extended != 0;
   how.estimate_camera = asked.estimate_camera != 0;
   auto loop = modar::PoseLoop::create(bundle->view, ours, how);
-  if (!loop) return modar::no_handle(loop.error(), error);
+  if (!loop) return modar::fail_null(loop.error(), error);
   const std::size_t patterns = bundle->view.patterns().size();
   const double smooth_ms = std::clamp(asked.smooth_ms, 0.0, 1000.0);
   return new modar_tracker{bundle,
@@ -94,18 +102,18 @@ void modar_tracker_reset(modar_tracker* tracker) {
 int modar_tracker_add_pattern(modar_tracker* tracker, const modar_record* record, uint32_t* pattern,
                               modar_error* error) {
   if (tracker == nullptr || record == nullptr) {
-    return modar::hand_over(modar::missing(tracker == nullptr ? "tracker" : "record"), error);
+    return modar::set_error(modar::missing(tracker == nullptr ? "tracker" : "record"), error);
   }
   auto own = tracker->own;
   own.push_back(record->words);
   std::vector<modar::OwnRecord> views;
   for (const auto& words : own) views.push_back(std::as_bytes(std::span(words)));
-  // What was found of the lens stays.
+  // The lens estimate stays.
   modar::Camera camera = tracker->camera;
   const modar::CameraEstimate& now = tracker->result.camera;
   if (now.estimated) camera.fx = camera.fy = now.focal;
   auto loop = modar::PoseLoop::create(tracker->bundle->view, camera, tracker->options, views);
-  if (!loop) return modar::hand_over(loop.error(), error);
+  if (!loop) return modar::set_error(loop.error(), error);
   tracker->camera = camera;
   tracker->loop = std::move(*loop);
   tracker->own = std::move(own);
@@ -119,29 +127,26 @@ void modar_tracker_destroy(modar_tracker* tracker) {
   delete tracker;
 }
 
-int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t stride,
+int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t stride, double time_s,
                        modar_error* error) {
-  const double before = tracker == nullptr ? 0.0 : tracker->time_s;
-  return modar_tracker_step_at(tracker, gray, stride, before + 1.0 / 30.0, error);
-}
-
-int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t stride, double time_s,
-                          modar_error* error) {
   if (tracker == nullptr || gray == nullptr) {
-    return modar::hand_over(modar::missing(tracker == nullptr ? "tracker" : "gray"), error);
+    return modar::set_error(modar::missing(tracker == nullptr ? "tracker" : "gray"), error);
   }
   const modar::Camera& camera = tracker->camera;
   if (stride < static_cast<std::size_t>(camera.width) || stride > kMostStride) {
-    return modar::hand_over(
+    return modar::set_error(
         {modar::ExitCode::kUsage, "capi.stride", "stride",
          std::to_string(stride) + " bytes a row, where the camera's frames are " +
              std::to_string(camera.width) + " pixels wide",
          "pass the bytes from one row of the gray plane to the next"},
         error);
   }
+  if (!modar::usable(time_s)) return modar::set_error(modar::bad_number("time_s"), error);
+  if (time_s < 0) time_s = tracker->time_s + 1.0 / 30.0;
+  if (const auto same = tracker->bundle->file.intact(); !same) return modar::set_error(same, error);
   const auto done = tracker->loop->step(
       {gray, camera.width, camera.height, static_cast<std::ptrdiff_t>(stride)}, tracker->result);
-  if (!done) return modar::hand_over(done, error);
+  if (!done) return modar::set_error(done, error);
   tracker->time_s = time_s;
   tracker->smoother.step(time_s, tracker->result.visible);
   const auto states = tracker->hysteresis.step(tracker->result.visible);
@@ -181,7 +186,7 @@ int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t st
 }
 
 void modar_tracker_turn(modar_tracker* tracker, const double rotation[3]) {
-  if (tracker == nullptr || rotation == nullptr) return;
+  if (tracker == nullptr || rotation == nullptr || !modar::usable(rotation, 3)) return;
   tracker->loop->set_turn({rotation[0], rotation[1], rotation[2]});
 }
 
@@ -200,14 +205,23 @@ double modar_tracker_camera(const modar_tracker* tracker, modar_camera* camera) 
   return now.estimated ? now.sigma : 0.0;
 }
 
-const char* modar_tracker_reason(const modar_tracker* tracker) {
-  return tracker == nullptr ? "no tracker" : modar::to_string(tracker->result.reason);
+int modar_tracker_reason(const modar_tracker* tracker) {
+  return tracker == nullptr ? -1 : static_cast<int>(tracker->result.reason);
+}
+
+const char* modar_reason_text(int reason) {
+  const bool known = reason >= 0 && reason <= MODAR_REASON_CURVED;
+  return known ? modar::to_string(static_cast<modar::Reason>(reason)) : "unknown";
 }
 
 void modar_view(const modar_pose* theirs, float view[16]) {
   if (theirs == nullptr || view == nullptr) return;
   const modar_pose asked = modar::grown(*theirs);
   const modar_pose* const pose = &asked;
+  if (!modar::usable(asked.rotation, 9) || !modar::usable(asked.translation, 3) ||
+      !modar::usable(asked.stretch, 12)) {
+    return;
+  }
   modar::Pose ours;
   glm::dmat4x3 stretch(1.0);
   const bool none = std::all_of(std::begin(pose->stretch), std::end(pose->stretch),

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -53,7 +55,7 @@ void give(Struct ours, Struct* to) {
 }
 
 /// Tells the caller, who may not want to know; answers the status.
-inline int hand_over(const Error& error, modar_error* to) {
+inline int set_error(const Error& error, modar_error* to) {
   const int status = static_cast<int>(error.exit);
   if (to == nullptr) return status;
   modar_error ours{};
@@ -66,13 +68,13 @@ inline int hand_over(const Error& error, modar_error* to) {
   return status;
 }
 
-inline int hand_over(const Result<void>& result, modar_error* to) {
-  return result ? 0 : hand_over(result.error(), to);
+inline int set_error(const Result<void>& result, modar_error* to) {
+  return result ? 0 : set_error(result.error(), to);
 }
 
 /// The same, where the answer is a handle: NULL.
-inline std::nullptr_t no_handle(const Error& error, modar_error* to) {
-  hand_over(error, to);
+inline std::nullptr_t fail_null(const Error& error, modar_error* to) {
+  set_error(error, to);
   return nullptr;
 }
 
@@ -112,6 +114,41 @@ inline std::size_t copy_name(std::string_view name, char* text, std::size_t size
 /// What a caller forgot.
 inline Error missing(const char* what) {
   return {ExitCode::kUsage, "capi.null", what, "is NULL", "pass it"};
+}
+
+/// Largest amount of a caller's number: calculations with larger ones overflow. Seconds since 1970
+/// fit, and pixels of a direction next to the camera's plane.
+constexpr double kLargestNumber = 1e12;
+
+/// False for NaN and too large values.
+inline bool usable(double number) {
+  return std::fabs(number) <= kLargestNumber;
+}
+template <class Number>
+bool usable(const Number* numbers, std::size_t count) {
+  return std::all_of(numbers, numbers + count, [](Number each) { return usable(double{each}); });
+}
+/// Whether frames of the camera can be calculated with, whatever its size.
+inline bool usable(const modar_camera& theirs) {
+  const modar_camera camera = grown(theirs);
+  const double lens[] = {camera.fx, camera.fy, camera.cx, camera.cy};
+  return usable(lens, 4) && usable(camera.distortion, std::size(camera.distortion));
+}
+inline bool usable(const modar_item& item) {
+  return usable(item.to_eye, 16) && usable(item.world_to_eye, 16) && usable(double{item.opacity});
+}
+
+/// Of the camera and the projection; NULL counts as usable. drawing: of this version's
+/// size.
+inline bool usable(const modar_drawing& drawing) {
+  return (drawing.camera == nullptr || usable(*drawing.camera)) &&
+         (drawing.projection == nullptr || usable(drawing.projection, 16));
+}
+
+/// The error of a number that is not usable().
+inline Error bad_number(const char* where) {
+  return {ExitCode::kUsage, "capi.number", where, "is no number, or larger than 1e12",
+          "pass a finite one"};
 }
 
 inline Camera camera_of(const modar_camera& theirs) {

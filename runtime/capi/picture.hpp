@@ -8,7 +8,7 @@
 
 namespace modar {
 
-/// Nothing, or what is wrong with a frame: its format, sides, planes or strides. picture: of this
+/// Nothing, or the fault of a frame: its format, sides, planes or strides. picture: of this
 /// version's size. Errors: kUsage "capi.picture", "capi.stride", "capi.null".
 inline Result<void> check_picture(const modar_picture& picture) {
   const auto wrong = [](const char* code, const char* where, std::string cause, const char* cure) {

@@ -12,9 +12,21 @@ namespace {
 /// "No such file" answers before an object counts as missing: servers err while files are replaced.
 constexpr unsigned kMissingAttempts = 3;
 
-/// An attempt counts as progress if it ended so many bytes further than any before, or with the
-/// rest: a server that sends a byte now and then gets an attempt for each KiB of a file at most.
+/// Bytes beyond all earlier attempts that count as progress. Lower lets a slow server have endless
+/// attempts.
 constexpr std::uint64_t kLeastProgress = 1024;
+
+/// Bytes that are kept of a text that is too long: enough to see what it is.
+constexpr std::size_t kStart = 64;
+
+/// A network that wants a login first answers everything with its own page. No document of a
+/// release begins like one.
+bool is_web_page(std::string_view text) {
+  const std::size_t first = text.find_first_not_of("\xEF\xBB\xBF \t\r\n");
+  return first != std::string_view::npos && text[first] == '<';
+}
+
+constexpr const char* kWebPage = "a web page came in place of the file; log in to this network";
 
 }  // namespace
 
@@ -39,6 +51,8 @@ bool Attempts::begin(Transfer& transfer) {
 bool Attempts::take(Transfer& transfer, std::span<const std::byte> bytes) {
   if (transfer.have + bytes.size() > transfer.limit) {
     transfer.too_long = true;
+    const std::size_t kept = transfer.object == nullptr ? std::min(bytes.size(), kStart) : 0;
+    transfer.text.append(reinterpret_cast<const char*>(bytes.data()), kept);
     return false;
   }
   if (transfer.object == nullptr) {
@@ -74,6 +88,12 @@ Outcome Attempts::end(Transfer& transfer, const Answer& answer) {
 }
 
 Outcome Attempts::classify(Transfer& transfer, const Answer& answer) {
+  const bool whole = transfer.too_long || answer.kind == Answer::Kind::kEnded;
+  if (answer.kind == Answer::Kind::kLogin || (whole && is_web_page(transfer.text))) {
+    transfer.error = {kExitNetwork, "fetch.login", address_of(transfer), kWebPage,
+                      "then run modar-fetch again: it resumes where it stopped"};
+    return Outcome::kFailed;
+  }
   if (transfer.too_long && transfer.object == nullptr) {  // no document of a release is so long
     transfer.error = {kExitMixed, "fetch.too-long", address_of(transfer),
                       "it is longer than " + std::to_string(transfer.limit) + " bytes",
@@ -98,6 +118,7 @@ Outcome Attempts::classify(Transfer& transfer, const Answer& answer) {
     case Answer::Kind::kNoRange:
       discard(transfer);
       return again(transfer, "the server does not know the rest of the file");
+    case Answer::Kind::kLogin:
     case Answer::Kind::kBroken:
     case Answer::Kind::kEnded:
       break;
@@ -108,21 +129,29 @@ Outcome Attempts::classify(Transfer& transfer, const Answer& answer) {
     discard(transfer);  // a text is not resumed: its length is not known
     return again(transfer, answer.cause);
   }
-  if (transfer.have == transfer.object->size) return check_object(transfer);
-  return again(transfer, ended ? "the connection ended early" : answer.cause);
+  const bool complete = transfer.have == transfer.object->size;
+  return ended || complete ? check_object(transfer) : again(transfer, answer.cause);
 }
 
-/// Verifies a complete object; discards it and tries again if it is wrong.
+/// Verifies an object that was received; tries again if it is wrong, from the start if it is not a
+/// part of the right one.
 Outcome Attempts::check_object(Transfer& transfer) {
   bool right = false;
+  bool page = false;
   const ObjectRequest& object = *transfer.object;
   if (const auto file = object.folder->map(transfer.part_name())) {
-    right = object_id(file->bytes()) == object.id;
+    const std::string_view bytes(reinterpret_cast<const char*>(file->bytes().data()),
+                                 file->bytes().size());
+    right = bytes.size() == object.size && object_id(file->bytes()) == object.id;
+    page = is_web_page(bytes.substr(0, kStart));
+  }
+  if (!right && !page && transfer.have < object.size) {
+    return again(transfer, "the connection ended early");
   }
   if (!right) {
     ++stats_.corrupt;
     discard(transfer);
-    return again(transfer, "the received data differs from the published data");
+    return again(transfer, page ? kWebPage : "the received data differs from the published data");
   }
   if (auto moved = object.folder->rename(transfer.part_name(), to_hex(object.id)); !moved) {
     transfer.error = moved.error();
@@ -131,7 +160,7 @@ Outcome Attempts::check_object(Transfer& transfer) {
   return Outcome::kDone;
 }
 
-/// Schedules another attempt, unless too many in a row brought no data.
+/// Schedules another attempt, unless too many in a row received no data.
 Outcome Attempts::again(Transfer& transfer, const std::string& cause) {
   const bool progress = transfer.have >= transfer.furthest + kLeastProgress;
   transfer.furthest = std::max(transfer.furthest, transfer.have);

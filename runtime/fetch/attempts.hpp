@@ -1,4 +1,4 @@
-// One download and the rules for trying again: what was received, whether it is right, when to give
+// One download and the rules for trying again: received bytes, whether they are right, when to give
 // up. Knows nothing about networks. Internal to runtime/fetch.
 #pragma once
 
@@ -24,7 +24,7 @@ struct Transfer {
   std::size_t limit = 0;  ///< most bytes that are accepted
   const ObjectRequest* object =
       nullptr;            ///< an object, received into its part file; nullptr: a text
-  std::string text;       ///< what was received of a text
+  std::string text;       ///< the received part of a text
   bool optional = false;  ///< believe the first answer "no such file"
 
   std::optional<OutputFile> part;
@@ -44,8 +44,9 @@ struct Answer {
   enum class Kind {
     kEnded,    ///< at the end of the file
     kBroken,   ///< before it, or with an error
-    kNoRange,  ///< the file cannot be continued from where it was asked for
+    kNoRange,  ///< the file cannot be continued from the requested place
     kMissing,  ///< there is no such file
+    kLogin,    ///< the network wants a login first
     kFatal,    ///< trying again is of no use
   };
   Kind kind = Kind::kEnded;
@@ -62,8 +63,8 @@ class Attempts {
   Attempts(const TransferOptions& options, std::string address)
       : options_(options), address_(std::move(address)) {}
 
-  /// Receives progress in bytes, negative for what is discarded; may be empty.
-  void tell_progress(std::function<void(std::int64_t)> on_bytes) {
+  /// Receives progress in bytes, negative for discarded ones; may be empty.
+  void report_progress(std::function<void(std::int64_t)> on_bytes) {
     on_bytes_ = std::move(on_bytes);
   }
   [[nodiscard]] const TransferStats& stats() const { return stats_; }
@@ -78,7 +79,7 @@ class Attempts {
   void count(std::size_t bytes) { stats_.bytes += bytes; }
   /// Takes the next bytes of the file; false: the attempt is to be broken off.
   bool take(Transfer& transfer, std::span<const std::byte> bytes);
-  /// Forgets what was received.
+  /// Forgets all received bytes.
   void discard(Transfer& transfer);
   /// Ends an attempt. After kAgain the next one is due at transfer.not_before.
   Outcome end(Transfer& transfer, const Answer& answer);

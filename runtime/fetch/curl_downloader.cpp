@@ -16,10 +16,10 @@ namespace {
 
 using Clock = Transfer::Clock;
 
-/// Time for the first packet and the three that follow it where it is lost, after 1, 3 and 7 s
-/// (RFC 6298), and for the answer to the last over a 2G link.
+/// Seconds for a connection: the first packet, three repetitions (RFC 6298), and an answer over a
+/// 2G link.
 constexpr long kConnectSeconds = 15;
-/// Bytes a second below which a connection is closed after stall_s: 2G brings 3000.
+/// Bytes a second below which a connection is closed after stall_s: 2G has 3000.
 constexpr long kLeastSpeed = 64;
 
 /// A PEM file of authorities, as curl and OpenSSL take it from the environment; empty: the
@@ -143,8 +143,12 @@ Answer answer_of(const Download& download, CURLcode code) {
             {},
             {kExitNetwork, "fetch.tls", download.attempts->address_of(*download.transfer),
              std::string("the TLS connection failed: ") + words,
-             "pass its certificate authority with --cacert, and check the clock"}};
+             "check the clock, log in to this network, or pass its authority with --cacert"}};
   }
+  if (code == CURLE_UNSUPPORTED_PROTOCOL && (status < 300 || status > 399)) {
+    return {Answer::Kind::kBroken, "the response has no HTTP header", {}};
+  }
+  if (status == 511) return {Answer::Kind::kLogin, {}, {}};  // Network Authentication Required
   if (code == CURLE_UNSUPPORTED_PROTOCOL) {
     return {Answer::Kind::kFatal,
             {},

@@ -37,7 +37,7 @@ Result<TrustDocument> download_trust(Transfers& transfers, const std::string& pa
 using KeyId = std::array<std::uint8_t, 8>;
 
 /// What this device believes, and how it came to it.
-struct Belief {
+struct TrustState {
   const Store& store;
   StoreState state;
   /// Both copies of the state are gone though a release is installed: nothing is saved before a
@@ -59,18 +59,18 @@ Result<std::optional<std::string>> download_optional(Transfers& transfers, const
 
 /// The root keys that count now: those of --trust, and where the chain of root keys leads from
 /// them. What verifies is saved at once: a set that was left is not believed again.
-Result<RootSet> follow_root_links(Transfers& transfers, Belief& belief) {
-  StoreState& state = belief.state;
+Result<RootSet> verify_root_rotations(Transfers& transfers, TrustState& trust) {
+  StoreState& state = trust.state;
   MODAR_ASSIGN(auto roots, parse_root_set(state.roots.empty() ? state.root_key : state.roots));
   const SignatureReader read = [&](const std::string& path) {
     return download_optional(transfers, path, kMaxSignatureBytes);
   };
   while (state.root_serial < kMaxLinks) {
-    const std::string path = root_link_path(state.root_serial + 1);
+    const std::string path = root_rotation_path(state.root_serial + 1);
     MODAR_ASSIGN(const auto text, download_optional(transfers, path, kMaxLinkBytes));
     if (!text) break;
     MODAR_TRY(verify_root_signatures(path, *text, roots, read));
-    MODAR_ASSIGN(auto link, parse_root_link(*text));
+    MODAR_ASSIGN(auto link, parse_root_rotation(*text));
     if (link.serial != state.root_serial + 1) {
       return fail(kExitMixed, "fetch.chain", path, "it is a different link of the chain",
                   "publish the chain of root keys again");
@@ -79,16 +79,16 @@ Result<RootSet> follow_root_links(Transfers& transfers, Belief& belief) {
     roots = std::move(link.roots);
     state.roots = root_set_line(roots);
     state.root_serial = link.serial;
-    MODAR_TRY(belief.save());
+    MODAR_TRY(trust.save());
   }
   return roots;
 }
 
-/// Believes the root's word if there is a newer one than the state knows. Only the root keys sign
+/// Believes the root metadata if there is a newer one than the state knows. Only the root keys sign
 /// it, so no thief of a signing key can stop or forge it.
-Result<void> follow_root(Transfers& transfers, Belief& belief) {
-  StoreState& state = belief.state;
-  MODAR_ASSIGN(const auto roots, follow_root_links(transfers, belief));
+Result<void> follow_root(Transfers& transfers, TrustState& trust) {
+  StoreState& state = trust.state;
+  MODAR_ASSIGN(const auto roots, verify_root_rotations(transfers, trust));
   const std::string path = "root.json";
   MODAR_ASSIGN(const auto text, download_optional(transfers, path, kMaxLinkBytes));
   if (!text && !state.trusted_key.empty()) return {};
@@ -106,21 +106,21 @@ Result<void> follow_root(Transfers& transfers, Belief& belief) {
       return download_optional(transfers, signature, kMaxSignatureBytes);
     }));
   }
-  MODAR_ASSIGN(const auto word, parse_root_word(*text));
+  MODAR_ASSIGN(const auto word, parse_root_metadata(*text));
   if (word.epoch <= state.epoch) return {};  // known, or replayed
   MODAR_ASSIGN(const auto key, parse_public_key(word.key));
   state.trusted_key = public_key_line(key);
   state.epoch = word.epoch;
   state.key_serial = word.links;
   state.version = 0;
-  return belief.save();
+  return trust.save();
 }
 
 /// Moves the trust along the chain of keys until `target` is trusted; to the chain's end where the
 /// state is fresh, so that a key that was left behind is not believed again. What verifies is saved
 /// at once.
-Result<void> follow_chain(Transfers& transfers, const Signature& target, Belief& belief) {
-  StoreState& state = belief.state;
+Result<void> follow_chain(Transfers& transfers, const Signature& target, TrustState& trust) {
+  StoreState& state = trust.state;
   MODAR_ASSIGN(auto trusted, parse_public_key(state.trusted_key));
   while ((state.fresh || trusted.id != target.key_id) && state.key_serial < kMaxLinks) {
     const std::uint32_t serial = state.key_serial + 1;
@@ -132,17 +132,17 @@ Result<void> follow_chain(Transfers& transfers, const Signature& target, Belief&
     // A device that joined in the middle passes over the links before its key.
     if (document->signature.key_id != trusted.id) continue;
     MODAR_TRY(verify_signature(document->text, document->signature, trusted));
-    MODAR_ASSIGN(const auto link, parse_key_link(document->text));
+    MODAR_ASSIGN(const auto link, parse_key_rotation(document->text));
     if (link.serial != serial) {
       return fail(kExitMixed, "fetch.chain", path, "it is a different link of the chain",
                   "publish the chain of keys again");
     }
-    belief.passed.push_back(trusted.id);
+    trust.passed.push_back(trusted.id);
     MODAR_ASSIGN(trusted, parse_public_key(link.key));
     state.trusted_key = public_key_line(trusted);
-    MODAR_TRY(belief.save());
+    MODAR_TRY(trust.save());
   }
-  belief.passed.push_back(trusted.id);
+  trust.passed.push_back(trusted.id);
   return {};  // where the end of the chain is not `target`, the signature check reports it
 }
 
@@ -184,10 +184,11 @@ Result<void> check_freshness(Transfers& transfers, const PublicKey& trusted, std
 }
 
 /// The server's newest release. Where another key than the trusted one has signed it, asks for the
-/// root's word and follows the chain of keys.
+/// root metadata and follows the chain of keys.
 /// Errors: kExitWrongKey; kExitMixed; kExitNetwork; kInvalidInput "release.*".
-Result<SignedRelease> download_release(Transfers& transfers, std::int64_t clock, Belief& belief) {
-  StoreState& state = belief.state;
+Result<SignedRelease> download_release(Transfers& transfers, std::int64_t clock,
+                                       TrustState& trust) {
+  StoreState& state = trust.state;
   MODAR_ASSIGN(const auto latest, transfers.text("latest", kMaxLatestBytes));
   MODAR_ASSIGN(const auto version, parse_latest(latest));
   const std::string path = "releases/" + std::to_string(version) + ".json";
@@ -197,10 +198,10 @@ Result<SignedRelease> download_release(Transfers& transfers, std::int64_t clock,
   offered.text = std::move(text);
   offered.signature_text = std::move(signature_text);
   MODAR_ASSIGN(const auto signature, parse_signature(offered.signature_text));
-  const auto before = parse_public_key(state.trusted_key);  // none: no root's word is known yet
+  const auto before = parse_public_key(state.trusted_key);  // none: no root metadata is known yet
   if (state.fresh || !before || before->id != signature.key_id) {
-    MODAR_TRY(follow_root(transfers, belief));
-    MODAR_TRY(follow_chain(transfers, signature, belief));
+    MODAR_TRY(follow_root(transfers, trust));
+    MODAR_TRY(follow_chain(transfers, signature, trust));
   }
   MODAR_ASSIGN(const auto trusted, parse_public_key(state.trusted_key));
   MODAR_TRY(verify_signature(offered.text, signature, trusted));
@@ -232,7 +233,7 @@ TransferOptions transfer_options(const FetchOptions& options, const std::string&
   return transfer;
 }
 
-/// Refuses a release that is older than what was installed or than `least` (epoch, version), has
+/// Refuses a release that is older than the installed one or than `least` (epoch, version), has
 /// expired, or differs from the installed one of the same number.
 Result<void> check_release(const SignedRelease& offered, const StoreState& state,
                            const std::optional<InstalledRelease>& active, std::int64_t now,
@@ -274,11 +275,11 @@ Result<void> check_release(const SignedRelease& offered, const StoreState& state
   return {};
 }
 
-/// Where the state was lost, the installed release tells what was believed: no epoch before its
+/// Where the state was lost, the installed release states the trusted values: no epoch before its
 /// own, and in its epoch no keys that do not lead past the one that signed it.
-Result<void> check_lost_state(const SignedRelease& offered, const Belief& belief,
+Result<void> check_lost_state(const SignedRelease& offered, const TrustState& trust,
                               const std::optional<InstalledRelease>& installed) {
-  if (!belief.lost || !installed || offered.release.epoch > installed->release.epoch) return {};
+  if (!trust.lost || !installed || offered.release.epoch > installed->release.epoch) return {};
   const std::string where = "release " + std::to_string(offered.release.version);
   if (offered.release.epoch < installed->release.epoch) {
     return fail(kExitRollBack, "fetch.epoch", where,
@@ -288,8 +289,8 @@ Result<void> check_lost_state(const SignedRelease& offered, const Belief& belief
   }
   const auto text = installed->folder.read("release.json.minisig", kMaxSignatureBytes);
   const auto signature = parse_signature(text.value_or(""));
-  const bool led = !signature || std::find(belief.passed.begin(), belief.passed.end(),
-                                           signature->key_id) != belief.passed.end();
+  const bool led = !signature || std::find(trust.passed.begin(), trust.passed.end(),
+                                           signature->key_id) != trust.passed.end();
   if (led) return {};
   return fail(kExitWrongKey, "fetch.retired", where,
               "the server's keys do not lead to " + to_hex(signature->key_id) +
@@ -300,8 +301,8 @@ Result<void> check_lost_state(const SignedRelease& offered, const Belief& belief
 /// The time, as late as is known: clocks of devices start in 1970 without a battery.
 std::int64_t clock_of(const FetchOptions& options, const StoreState& state,
                       const std::optional<InstalledRelease>& active) {
-  // Nothing that this program reads was signed before it was written: raised with each release.
-  constexpr std::int64_t kNotBefore = 1'795'392'000;  // 2026-11-23
+  // kNotBefore: the day of this program's last commit.
+#include "commit_day.inc"
   std::int64_t clock = options.now != 0 ? options.now : std::int64_t{std::time(nullptr)};
   clock = std::max({clock, kNotBefore, state.time});
   const auto text = active ? active->folder.read("fresh.json", kMaxLinkBytes) : std::nullopt;
@@ -359,14 +360,14 @@ Result<FetchReport> fetch_release(const FetchOptions& options) {
   const std::string installed =
       active ? "release " + std::to_string(active->release.version) : "nothing installed";
   MODAR_ASSIGN(auto transfers, Transfers::create(transfer_options(options, installed)));
-  Belief belief{store, store.state(), false, {}};
-  StoreState& state = belief.state;
-  belief.lost = state.fresh && active.has_value();
+  TrustState trust{store, store.state(), false, {}};
+  StoreState& state = trust.state;
+  trust.lost = state.fresh && active.has_value();
   MODAR_TRY(recall_trust(options.trusted_key, state));
   const std::int64_t known_time = state.time;
   const std::int64_t clock = clock_of(options, state, active);
-  MODAR_ASSIGN(const auto offered, download_release(transfers, clock, belief));
-  MODAR_TRY(check_lost_state(offered, belief, active));
+  MODAR_ASSIGN(const auto offered, download_release(transfers, clock, trust));
+  MODAR_TRY(check_lost_state(offered, trust, active));
   MODAR_TRY(
       check_release(offered, state, active, clock, {options.least_epoch, options.least_version}));
   MODAR_ASSIGN(const auto chosen, choose_bundles(offered.release, options));
@@ -423,7 +424,7 @@ std::optional<StoreReport> installed_release(const std::string& store) {
   return StoreReport{installed->release.version, installed_paths(*folder, *installed), false};
 }
 
-std::vector<std::string> first_sights(const std::string& store) {
+std::vector<std::string> previews(const std::string& store) {
   using namespace fetch;
   const auto folder = Folder::open(store, false);
   return folder ? first_paths(*folder, active_release(*folder)) : std::vector<std::string>();

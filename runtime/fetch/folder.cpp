@@ -12,13 +12,17 @@
 #include <cstring>
 #include <utility>
 
+#include "formats/base/atomic_file.hpp"
+#include "modar/release.hpp"
+
 namespace modar::fetch {
 namespace {
 
 constexpr const char* kStoreCure = "check that the store's folder is writable and has room";
 
 tl::unexpected<Error> io(const char* code, const std::string& path, const char* cure = kStoreCure) {
-  return fail(ExitCode::kIo, code, path, std::strerror(errno), cure);
+  const bool full = errno == ENOSPC || errno == EDQUOT;
+  return fail(full ? kExitNoSpace : ExitCode::kIo, code, path, std::strerror(errno), cure);
 }
 
 /// Closes itself.
@@ -112,7 +116,9 @@ int Folder::number() const {
 }
 
 Result<Folder> Folder::open(const std::string& path, bool make) {
-  if (make && ::mkdir(path.c_str(), 0755) != 0 && errno != EEXIST) return io("io.create", path);
+  const bool made = make && ::mkdir(path.c_str(), 0755) == 0;
+  if (make && !made && errno != EEXIST) return io("io.create", path);
+  if (made && !sync_folder(path + "/..")) return io("io.sync", path);
   auto opened =
       std::make_shared<const Descriptor>(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (opened->number < 0) return io("io.create", path);

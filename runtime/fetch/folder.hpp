@@ -1,4 +1,4 @@
-// A folder held open: what is done in it stays in it, whatever links others plant. Internal to
+// A folder held open: changes stay in it, whatever links others plant. Internal to
 // runtime/fetch.
 #pragma once
 
@@ -61,7 +61,7 @@ class Folder {
   /// Writes a file anew: whatever had the name keeps its bytes and loses the name. Errors: kIo
   /// "io.create" (a folder has the name).
   [[nodiscard]] Result<OutputFile> create(const std::string& name) const;
-  /// Goes on with a file that has no other name; else as create().
+  /// Continues a file that has no other name; else as create().
   [[nodiscard]] Result<OutputFile> resume(const std::string& name) const;
   /// The whole file in one step, synced. Errors: kIo.
   [[nodiscard]] Result<void> replace(const std::string& name, std::string_view text) const;

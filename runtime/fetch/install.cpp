@@ -103,10 +103,10 @@ std::optional<std::vector<std::byte>> PieceSource::raw(const ObjectId& id) const
 /// A bundle under construction.
 struct Assembly {
   ReleaseBundle bundle;
-  std::string recipe_stored;                ///< as downloaded, kept beside the bundle
+  std::string recipe_stored;                ///< as downloaded, kept next to the bundle
   std::vector<std::uint64_t> recipe_bytes;  ///< unpacked, aligned
   RecipeView recipe;
-  bool shows = false;  ///< has a first sight
+  bool shows = false;  ///< has a preview
 };
 
 /// The file that pieces are written into, and which.
@@ -183,11 +183,11 @@ Result<void> assemble(const Assembly& assembly, const Target& target, const Piec
 
 // --- A release ---
 
-/// Left free beyond what is needed, for folders, links and the state: 256 blocks of 4 KiB, of which
+/// Left free beyond the need, for folders, links and the state: 256 blocks of 4 KiB, of which
 /// each takes one or two.
 constexpr std::uint64_t kSpareBytes = 1u << 20;
 
-/// Most raw bytes of a first sight, which is made in memory. More are shown when they are whole.
+/// Most raw bytes of a preview, which is made in memory. More are shown when they are whole.
 constexpr std::uint64_t kMostFirstBytes = 32u << 20;
 
 /// Reports progress at most ten times a second.
@@ -259,7 +259,7 @@ class Installation {
       Assembly& assembly = assemblies_.emplace_back();
       assembly.bundle = bundle;
       MODAR_TRY(open_stored_recipe(assembly));
-      assembly.shows = has_first_sight(assembly);
+      assembly.shows = has_preview(assembly);
     }
     return {};
   }
@@ -289,7 +289,7 @@ class Installation {
 
   /// Whether somebody wants to show the bundle before all of it is there: none of that name is in
   /// use.
-  [[nodiscard]] bool has_first_sight(const Assembly& assembly) const {
+  [[nodiscard]] bool has_preview(const Assembly& assembly) const {
     if (!options_.first || shown_bytes(assembly) > kMostFirstBytes) return false;
     return !active_ || !active_->folder.size(assembly.bundle.name + kWhole);
   }
@@ -352,7 +352,7 @@ class Installation {
     return {};
   }
 
-  /// What is shown first comes first, one bundle after the other, then the rest.
+  /// Previews come first, one bundle after the other, then the rest.
   Result<void> bring_pieces() {
     std::vector<std::vector<ObjectRequest>> turns(assemblies_.size() + 1);
     std::uint64_t total = 0;
@@ -394,20 +394,20 @@ class Installation {
         "make room and run modar-fetch again");
   }
 
-  /// Tells of the first sight of a new bundle, once. Where none can be made, the bundle is seen
+  /// Reports the preview of a new bundle, once. Where none can be made, the bundle is seen
   /// when it is whole, or the build says why. room: bytes, less what it takes.
   void show_first(Assembly& assembly, std::uint64_t& room) {
     const std::uint64_t bytes = shown_bytes(assembly);
     if (!std::exchange(assembly.shows, false) || assembly.bundle.size + bytes > room) return;
     const std::string name = assembly.bundle.name + kFirst;
-    const bool made = make_first_sight(assembly, name).has_value();
+    const bool made = make_preview(assembly, name).has_value();
     static_cast<void>(pieces_.remove(name + ".part"));
     if (!made) return;
     room -= bytes;
     options_.first(pieces_.path_of(name));
   }
 
-  Result<void> make_first_sight(const Assembly& assembly, const std::string& name) {
+  Result<void> make_preview(const Assembly& assembly, const std::string& name) {
     AssemblyCounts counts;
     const std::size_t known = damaged_.size();
     const std::string part = name + ".part";
@@ -418,9 +418,9 @@ class Installation {
       MODAR_ASSIGN(auto file, pieces_.resume(part));
       MODAR_TRY(file.write_at(0, start->data(), start->size()));
     }
-    MODAR_ASSIGN(mapped, pieces_.map(part));  // with what was written
+    MODAR_ASSIGN(mapped, pieces_.map(part));  // with the written part
     MODAR_ASSIGN(const BundleView view, BundleView::open(mapped.bytes()));
-    MODAR_ASSIGN(const auto bytes, encode_bundle(first_sight(view)));
+    MODAR_ASSIGN(const auto bytes, encode_bundle(preview(view)));
     const std::string error = first_error(bytes, {.release = {}, .accept_newer = true});
     if (!error.empty() || damaged_.size() != known) {
       return fail(kExitBadBundle, "store.rules", pieces_.path_of(name), error, "");
@@ -502,7 +502,7 @@ class Installation {
   PieceSource source_;
   std::vector<Assembly> assemblies_;
   std::set<ObjectId> damaged_;
-  std::set<std::string> kept_;  // bundles that stay in the slot as they are
+  std::set<std::string> kept_;  // bundles that stay in the slot unchanged
 };
 
 }  // namespace
@@ -517,7 +517,7 @@ Result<void> verify_bundle(const Folder& slot, const ReleaseBundle& bundle) {
   MODAR_ASSIGN(const auto mapped, slot.map(bundle.name + ".modar"));
   const std::string file = slot.path_of(bundle.name + ".modar");
   if (mapped.bytes().size() != bundle.size || bundle_hash(mapped.bytes()) != bundle.hash) {
-    return fail(kExitBadBundle, "store.hash", file, "it differs from what was signed",
+    return fail(kExitBadBundle, "store.hash", file, "it differs from the signed one",
                 "run modar-fetch again");
   }
   const std::string error = first_error(mapped.bytes(), {.release = {}, .accept_newer = true});

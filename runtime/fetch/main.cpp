@@ -66,7 +66,7 @@ struct CommandLine {
   FetchOptions options;
   std::string trust_file;
   std::string status_file;  ///< empty: none
-  bool verify = false;      ///< only check what is installed
+  bool verify = false;      ///< only check the installed release
   bool json = false;
   bool quiet = false;
   bool help = false;
@@ -267,14 +267,14 @@ void write_status(const CommandLine& line, const Status& status) {
   json.Key("changed");
   json.Bool(status.changed);
   write_paths(json, "bundles", status.bundles);
-  write_paths(json, "first", first_sights(line.options.store));
+  write_paths(json, "first", previews(line.options.store));
   json.EndObject();
   buffer.Put('\n');
   const std::string_view all(buffer.GetString(), buffer.GetSize());
   if (auto written = write_file(line.status_file, all); !written) answer(written.error());
 }
 
-/// What is in use while the fetch goes on, or after it failed.
+/// The release in use during the fetch, or after it failed.
 Status installed_status(const CommandLine& line) {
   Status status;
   if (auto installed = installed_release(line.options.store)) {
@@ -285,7 +285,7 @@ Status installed_status(const CommandLine& line) {
 }
 
 /// The rest of the release is yet to come.
-void tell_first(const CommandLine& line, const std::string& path) {
+void report_first(const CommandLine& line, const std::string& path) {
   Status status = installed_status(line);
   status.result = "first";
   write_status(line, status);
@@ -311,7 +311,7 @@ Result<void> keep_no_status(const std::string& path) {
 }
 
 int fail_with_status(const CommandLine& line, const Error& error) {
-  Status status = installed_status(line);  // what is installed stays in use
+  Status status = installed_status(line);  // the installed release stays in use
   status.error = &error;
   write_status(line, status);
   return answer(error);
@@ -350,7 +350,7 @@ int run_fetch(CommandLine& line) {
   const bool bar = !line.quiet && !line.json && ::isatty(STDERR_FILENO) != 0;
   if (bar) line.options.progress = show_progress;
   if (!line.quiet) line.options.waiting = WaitPrinter();
-  line.options.first = [&line](const std::string& path) { tell_first(line, path); };
+  line.options.first = [&line](const std::string& path) { report_first(line, path); };
   const auto report = fetch_release(line.options);
   if (bar) std::fputs("\r\033[K", stderr);
   if (!report) return fail_with_status(line, report.error());
@@ -378,6 +378,7 @@ int run_fetch(CommandLine& line) {
 int main(int argc, char** argv) {
   using namespace modar;
   using namespace modar::fetch;
+  guard_mapped_files();
   auto line = read_command_line(std::span(argv, static_cast<std::size_t>(argc)).subspan(1));
   if (!line) return answer(line.error());
   if (line->help || line->version) {

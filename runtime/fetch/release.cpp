@@ -83,7 +83,7 @@ constexpr std::string_view kUntrusted = "untrusted comment: ";
 constexpr std::string_view kTrusted = "trusted comment: ";
 
 /// Removes the first line from `text` and returns it without its line end.
-std::string_view take_line(std::string_view& text) {
+std::string_view parse_line(std::string_view& text) {
   const std::size_t end = std::min(text.find('\n'), text.size());
   std::string_view line = text.substr(0, end);
   text.remove_prefix(std::min(end + 1, text.size()));
@@ -117,8 +117,8 @@ std::string to_base64(std::span<const std::uint8_t> bytes) {
 }
 
 Result<PublicKey> parse_public_key(std::string_view text) {
-  std::string_view line = take_line(text);
-  if (line.starts_with(kUntrusted)) line = take_line(text);
+  std::string_view line = parse_line(text);
+  if (line.starts_with(kUntrusted)) line = parse_line(text);
   std::array<std::uint8_t, 42> bytes{};
   if (!from_base64(line, bytes) || bytes[0] != 'E' || bytes[1] != 'd') {
     return fail(ExitCode::kInvalidInput, "key.public", "public key",
@@ -138,19 +138,19 @@ std::string public_key_line(const PublicKey& key) {
 }
 
 Result<Signature> parse_signature(std::string_view text) {
-  if (!take_line(text).starts_with(kUntrusted))
+  if (!parse_line(text).starts_with(kUntrusted))
     return bad_text("its first line is not an untrusted comment");
   std::array<std::uint8_t, 74> bytes{};
-  if (!from_base64(take_line(text), bytes) || bytes[0] != 'E' || bytes[1] != 'D') {
+  if (!from_base64(parse_line(text), bytes) || bytes[0] != 'E' || bytes[1] != 'D') {
     return bad_text("its second line is not an Ed25519 signature of the prehashed form");
   }
   Signature signature;
   std::copy_n(bytes.begin() + 2, 8, signature.key_id.begin());
   std::copy_n(bytes.begin() + 10, 64, signature.bytes.begin());
-  const std::string_view comment = take_line(text);
+  const std::string_view comment = parse_line(text);
   if (!comment.starts_with(kTrusted)) return bad_text("its third line is not a trusted comment");
   signature.trusted_comment = comment.substr(kTrusted.size());
-  if (!from_base64(take_line(text), signature.comment_bytes) || !text.empty()) {
+  if (!from_base64(parse_line(text), signature.comment_bytes) || !text.empty()) {
     return bad_text("its fourth line is not the signature of the trusted comment");
   }
   return signature;
@@ -221,8 +221,8 @@ Result<RootSet> make_root_set(std::vector<PublicKey> keys, unsigned threshold) {
 
 Result<RootSet> parse_root_set(std::string_view text) {
   std::string_view rest = text;
-  std::string_view line = take_line(rest);
-  if (line.starts_with(kUntrusted)) line = take_line(rest);
+  std::string_view line = parse_line(rest);
+  if (line.starts_with(kUntrusted)) line = parse_line(rest);
   if (line.empty() || line.front() < '0' || line.front() > '9') {
     MODAR_ASSIGN(const auto key, parse_public_key(text));
     return RootSet{1, {key}};
@@ -464,7 +464,7 @@ Result<Release> parse_release(std::string_view json) {
     }
     release.bundles.push_back(std::move(bundle));
   }
-  if (release.bundles.empty()) return bad("bundles", "there is none");
+  if (release.bundles.empty()) return bad("bundles", "it is absent");
   return release;
 }
 
@@ -567,27 +567,27 @@ std::string freshness_text(const Freshness& freshness) {
   });
 }
 
-Result<KeyLink> parse_key_link(std::string_view json) {
+Result<KeyRotation> parse_key_rotation(std::string_view json) {
   MODAR_ASSIGN(const auto document, parse_document(json, kKeyFormat));
   Members members(document);
-  KeyLink link;
+  KeyRotation link;
   link.serial = static_cast<std::uint32_t>(members.number("serial", 1000000));
   link.key = members.text("key");
   if (!members.missing().empty()) return bad(members.missing(), "it is missing or wrong");
   return link;
 }
 
-std::string key_link_text(const KeyLink& link) {
+std::string key_rotation_text(const KeyRotation& link) {
   return document_text(kKeyFormat, [&](Writer& json) {
     put(json, "serial", std::uint64_t{link.serial});
     put(json, "key", link.key);
   });
 }
 
-Result<RootWord> parse_root_word(std::string_view json) {
+Result<RootMetadata> parse_root_metadata(std::string_view json) {
   MODAR_ASSIGN(const auto document, parse_document(json, kRootFormat));
   Members members(document);
-  RootWord word;
+  RootMetadata word;
   word.epoch = members.number("epoch", kMaxNumber);
   word.links = static_cast<std::uint32_t>(members.number("links", 1000000));
   word.key = members.text("key");
@@ -596,7 +596,7 @@ Result<RootWord> parse_root_word(std::string_view json) {
   return word;
 }
 
-std::string root_word_text(const RootWord& word) {
+std::string root_metadata_text(const RootMetadata& word) {
   return document_text(kRootFormat, [&](Writer& json) {
     put(json, "epoch", word.epoch);
     put(json, "links", std::uint64_t{word.links});
@@ -604,14 +604,14 @@ std::string root_word_text(const RootWord& word) {
   });
 }
 
-std::string root_link_path(std::uint32_t serial) {
+std::string root_rotation_path(std::uint32_t serial) {
   return "roots/" + std::to_string(serial) + ".json";
 }
 
-Result<RootLink> parse_root_link(std::string_view json) {
+Result<RootRotation> parse_root_rotation(std::string_view json) {
   MODAR_ASSIGN(const auto document, parse_document(json, kRootLinkFormat));
   Members members(document);
-  RootLink link;
+  RootRotation link;
   link.serial = static_cast<std::uint32_t>(members.number("serial", 1000000));
   const std::string roots = members.text("roots");
   if (!members.missing().empty()) return bad(members.missing(), "it is missing or wrong");
@@ -622,7 +622,7 @@ Result<RootLink> parse_root_link(std::string_view json) {
   return link;
 }
 
-std::string root_link_text(const RootLink& link) {
+std::string root_rotation_text(const RootRotation& link) {
   return document_text(kRootLinkFormat, [&](Writer& json) {
     put(json, "serial", std::uint64_t{link.serial});
     put(json, "roots", root_set_line(link.roots));

@@ -17,7 +17,7 @@ constexpr std::uint64_t kMaxTime = 253402300799;  // the end of 9999
 constexpr std::string_view kRecipe = ".recipe";
 constexpr std::string_view kLinkTarget = "current/";
 
-/// Temporary files of ours at the top of a store, left behind by a fetch that was killed.
+/// Our temporary files at the top of a store, left behind by a fetch that was killed.
 bool is_leftover(const Folder& store, const std::string& name) {
   if (name.ends_with(".new")) return !store.link_target(name).empty();
   return name.ends_with(".tmp") &&
@@ -30,7 +30,7 @@ bool is_piece_name(std::string_view name) {
   return object_id_of_hex(name).has_value();
 }
 
-/// A first sight, or what a fetch that was killed while making one left behind.
+/// A preview, or what a fetch that was killed while making one left behind.
 bool is_first_name(std::string_view name) {
   const std::size_t at = name.rfind(kFirst);
   if (at == std::string_view::npos) return false;
@@ -189,7 +189,7 @@ const Folder& Store::spare_folder() const {
 }
 
 Result<void> Store::activate(const InstalledRelease& release) const {
-  MODAR_TRY(release.folder.sync());
+  for (const Folder* folder : {&release.folder, &slots_, &root_}) MODAR_TRY(folder->sync());
   const std::string target = release.folder.path().substr(root_.path().size() + 1);
   MODAR_ASSIGN(const bool linked, root_.switch_link("current", target));
   if (!linked) MODAR_TRY(root_.replace("current", target + "\n"));
@@ -200,7 +200,7 @@ Result<void> Store::activate(const InstalledRelease& release) const {
 Result<void> Store::link_bundles(const Release& release) const {
   const Folder& slot = current_slot(root_) == "slots/a" ? a_ : b_;
   for (const std::string& name : root_.list()) {
-    // A link of ours whose bundle is not in use any more.
+    // One of our links whose bundle is not in use any more.
     if (name.ends_with(kWhole) && root_.link_target(name) == std::string(kLinkTarget) + name &&
         !slot.size(name)) {
       MODAR_TRY(root_.remove(name));
@@ -262,7 +262,7 @@ Result<void> Store::remove_pieces(const std::set<std::string>& keep) const {
 }
 
 Result<void> Store::clear_slot(const Folder& slot, const std::set<std::string>& keep) const {
-  // Without its document the slot is no release. A bundle is ours if its recipe lies beside it:
+  // Without its document the slot is no release. A bundle is ours if its recipe is next to it:
   // that is written first and removed last.
   for (const char* name : {"release.json", "release.json.minisig", "fresh.json"}) {
     MODAR_TRY(slot.remove(name));

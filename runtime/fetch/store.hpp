@@ -2,7 +2,7 @@
 //
 //   lock                  held while a fetch is running
 //   state.json            trusted key, highest version installed; slots/state.json: a copy
-//   pieces/               what was downloaded so far; <id>.part is incomplete
+//   pieces/               the download so far; <id>.part is incomplete
 //   slots/a, slots/b      a release each: release.json, its signature, NAME.modar, NAME.recipe
 //   current -> slots/a    the release in use, switched in one step; where the file system has no
 //                         symbolic links, a file that says "slots/a"
@@ -27,19 +27,19 @@
 namespace modar::fetch {
 
 struct StoreState {
-  std::uint64_t epoch = 0;    ///< of the root's word that is believed; 0: none
+  std::uint64_t epoch = 0;    ///< of the root metadata that is believed; 0: none
   std::uint64_t version = 0;  ///< highest that was installed in that epoch
   std::string root_key;       ///< root_set_line() that was given with --trust
   std::string roots;          ///< where the chain of root keys has led to; empty: still root_key
   std::uint32_t root_serial = 0;  ///< of the chain's last link that was read
-  std::string trusted_key;  ///< where the root's word and the chain of keys have led to; empty:
+  std::string trusted_key;  ///< where the root metadata and the chain of keys have led to; empty:
                             ///< nowhere yet, as several root keys never sign releases
   std::uint32_t key_serial = 0;
   std::int64_t time = 0;  ///< latest that a believed document was signed at, seconds since 1970
   bool fresh = true;      ///< nothing is known: a new store, or both copies are lost
 };
 
-/// Endings of files: NAME.modar, in a slot, and NAME.first, the first sight of a bundle, in
+/// Endings of files: NAME.modar, in a slot, and NAME.first, the preview of a bundle, in
 /// `pieces`, which counts as no bundle.
 inline constexpr const char* kWhole = ".modar";
 inline constexpr const char* kFirst = ".first";
@@ -56,7 +56,7 @@ struct InstalledRelease {
 
 class Store {
  public:
-  /// Creates what is missing and takes the lock, which is held until the object is destroyed.
+  /// Creates missing parts and takes the lock, which is held until the object is destroyed.
   /// Errors: kIo, "store.link" where a folder of the store is a link; kExitLocked "store.locked".
   static Result<Store> open(const std::string& path);
 
@@ -76,13 +76,13 @@ class Store {
 
   /// Puts a complete slot in use and updates the links NAME.modar.
   Result<void> activate(const InstalledRelease& release) const;
-  /// Makes the links NAME.modar those of the release. A file of that name that is not a link of
-  /// ours stays.
+  /// Makes the links NAME.modar those of the release. A file of that name that is not one of our
+  /// links stays.
   Result<void> link_bundles(const Release& release) const;
   /// Bundles of the release whose link is missing because somebody else's file has its name.
   [[nodiscard]] std::vector<std::string> blocked_links(const Release& release) const;
 
-  /// Removes pieces and parts of pieces, but for those of the ids in `keep`, and first sights, but
+  /// Removes pieces and parts of pieces, but for those of the ids in `keep`, and previews, but
   /// for those whose names are in it.
   Result<void> remove_pieces(const std::set<std::string>& keep) const;
   /// Removes a release from a slot, but for the bundles in `keep`.
@@ -96,11 +96,11 @@ class Store {
 
 /// The slot in use, from `current`: "slots/a", "slots/b", or empty.
 std::string active_slot(const Folder& store);
-/// The release in use; nothing if there is none.
+/// The release in use; nothing if none exists.
 std::optional<InstalledRelease> active_release(const Folder& store);
 /// Paths of those of the bundles of the release in use that are installed.
 std::vector<std::string> installed_paths(const Folder& store, const InstalledRelease& release);
-/// Paths of the first sights of bundles of which `release` has none installed.
+/// Paths of the previews of bundles of which `release` has none installed.
 std::vector<std::string> first_paths(const Folder& store,
                                      const std::optional<InstalledRelease>& release);
 

@@ -84,9 +84,9 @@ Result<void> Transfers::objects(std::span<const ObjectRequest> requests,
     transfers[i].object = &requests[i];
     transfers[i].limit = static_cast<std::size_t>(requests[i].size);
   }
-  state_->attempts.tell_progress(on_bytes);
+  state_->attempts.report_progress(on_bytes);
   auto done = state_->run(transfers);
-  state_->attempts.tell_progress({});
+  state_->attempts.report_progress({});
   return done;
 }
 

@@ -29,7 +29,7 @@ void skip_blanks(std::string_view& text) {
   text.remove_prefix(std::min(first, text.size()));
 }
 
-std::optional<std::int64_t> take_integer(std::string_view& text) {
+std::optional<std::int64_t> parse_integer(std::string_view& text) {
   std::int64_t value = 0;
   if (text.starts_with('+')) text.remove_prefix(1);
   const auto [last, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -40,7 +40,7 @@ std::optional<std::int64_t> take_integer(std::string_view& text) {
 
 /// "5.3612345678901234e+02": right to about 15 digits, in any locale and without the standard
 /// library's tables.
-std::optional<double> take_number(std::string_view& text) {
+std::optional<double> parse_number(std::string_view& text) {
   const bool negative = text.starts_with('-');
   if (negative || text.starts_with('+')) text.remove_prefix(1);
   double mantissa = 0;
@@ -61,7 +61,7 @@ std::optional<double> take_number(std::string_view& text) {
   if (digits == 0) return std::nullopt;
   if (text.starts_with('e') || text.starts_with('E')) {
     text.remove_prefix(1);
-    const auto exponent = take_integer(text);
+    const auto exponent = parse_integer(text);
     if (!exponent || std::abs(*exponent) > 300) return std::nullopt;
     scale += static_cast<int>(*exponent);
   }
@@ -72,7 +72,7 @@ std::optional<double> take_number(std::string_view& text) {
 
 /// The numbers in the brackets that come next: how many, at most `values` has room for; -1 for
 /// others.
-int take_list(std::string_view text, std::span<double> values) {
+int parse_list(std::string_view text, std::span<double> values) {
   const std::size_t open = text.find('[');
   if (open == std::string_view::npos) return -1;
   text.remove_prefix(open + 1);
@@ -80,7 +80,7 @@ int take_list(std::string_view text, std::span<double> values) {
     skip_blanks(text);
     if (text.starts_with(']')) return static_cast<int>(count);
     if (count == values.size()) return -1;
-    const auto value = take_number(text);
+    const auto value = parse_number(text);
     if (!value) return -1;
     values[count] = *value;
   }
@@ -90,7 +90,7 @@ std::optional<int> size_of(std::string_view text, std::string_view key) {
   auto rest = after_key(text, key);
   if (!rest) return 0;
   skip_blanks(*rest);
-  const auto value = take_integer(*rest);
+  const auto value = parse_integer(*rest);
   if (!value || *value < 0 || *value > 65536) return std::nullopt;
   return static_cast<int>(*value);
 }
@@ -108,7 +108,7 @@ Result<Camera> read_camera_yml(const std::string& path) {
   Camera camera;
   const auto matrix = after_key(text, "camera_matrix");
   std::array<double, 9> k{};
-  if (!matrix || take_list(*matrix, k) != 9)
+  if (!matrix || parse_list(*matrix, k) != 9)
     return bad("camera.matrix", path, "it has no 3x3 camera matrix");
   camera.fx = k[0];
   camera.cx = k[2];
@@ -116,7 +116,7 @@ Result<Camera> read_camera_yml(const std::string& path) {
   camera.cy = k[5];
   if (const auto coefficients = after_key(text, "distortion_coefficients")) {
     std::array<double, 14> values{};
-    const int count = take_list(*coefficients, values);
+    const int count = parse_list(*coefficients, values);
     if (count < 0) return bad("camera.distortion", path, "a coefficient is not a number");
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (i < camera.distortion.size()) {

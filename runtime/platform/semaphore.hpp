@@ -1,5 +1,5 @@
 // A counting semaphore: waiters queue and are signalled, nobody spins. POSIX below, because
-// std::counting_semaphore of GCC 12 can sleep for ever beside a free count (its bug 104928).
+// std::counting_semaphore of GCC 12 can sleep for ever despite a free count (its bug 104928).
 #pragma once
 
 #include <semaphore.h>

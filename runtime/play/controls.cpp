@@ -1,4 +1,4 @@
-// Turns keys into choices, and choices into what is drawn. Every model stays in its buffers: a
+// Turns keys into choices, and choices into draw lists. Every model stays in its buffers: a
 // model that comes back needs nothing but its index.
 #include "controls.hpp"
 
@@ -82,7 +82,7 @@ void Controls::apply(const UserAct& act) {
 void Controls::load(const BundleView& bundle) {
   bundle_ = bundle;
   machine_ = std::make_unique<ActionMachine>(bundle);
-  // Each pattern, what was tapped, and each node that ends.
+  // Each pattern, the tapped node, and each node that ends.
   events_.reserve(bundle.patterns().size() + taps_.size() + bundle.nodes().size());
   if (model_ != kNone && model_ >= bundle.models().size()) model_ = kNone;
   if (only_pattern_ != kNone && only_pattern_ >= bundle.patterns().size()) only_pattern_ = kNone;

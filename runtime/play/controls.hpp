@@ -79,7 +79,7 @@ class Controls {
   [[nodiscard]] std::span<const glm::dvec2> corners() const {
     return {corners_.data(), corner_count_};
   }
-  /// True once four corners stand: they are in corners(), and the picture goes on.
+  /// True once four corners stand: they are in corners(), and the picture continues.
   bool take_corners(std::array<glm::dvec2, 4>& corners);
 
  private:

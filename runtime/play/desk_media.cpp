@@ -12,7 +12,7 @@
 namespace modar {
 namespace {
 
-/// Beside the program that runs: bin/../libexec/modar.
+/// Next to the running program: bin/../libexec/modar.
 std::string library_path() {
   std::array<char, 4096> program{};
   const ssize_t length = readlink("/proc/self/exe", program.data(), program.size());

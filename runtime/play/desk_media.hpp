@@ -15,7 +15,7 @@
 
 namespace modar {
 
-/// The pictures of a video that lies in memory, which outlives it.
+/// The pictures of a video in memory, which outlives it.
 class ClipReader {
  public:
   ClipReader() = default;
@@ -31,7 +31,7 @@ class ClipReader {
   [[nodiscard]] virtual RgbImage picture() const = 0;
 };
 
-/// The sound of a file that lies in memory, which outlives it.
+/// The sound of a file in memory, which outlives it.
 class SoundReader {
  public:
   SoundReader() = default;

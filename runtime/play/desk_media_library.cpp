@@ -5,9 +5,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <numeric>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -49,7 +52,7 @@ void fill(Frame& frame, const cv::Mat& picture) {
 class VideoSource final : public FrameSource {
  public:
   VideoSource(VideoReader reader, bool live) : reader_(std::move(reader)) {
-    info_ = {reader_.fps(), reader_.frames(), live};
+    info_ = {reader_.fps(), reader_.frames(), live, false};
   }
 
   [[nodiscard]] SourceInfo info() const override { return info_; }
@@ -76,12 +79,56 @@ class VideoSource final : public FrameSource {
   std::atomic<bool> stopped_{false};
 };
 
+/// Brightness on a coarse grid: tells whether a picture continues the one before it.
+class SceneChange {
+ public:
+  /// True if the frame shows another scene than the frame of the last call.
+  bool step(const GrayImage& frame) {
+    std::array<double, kGrid * kGrid> now{};
+    for (int y = 0; y < kGrid; ++y) {
+      for (int x = 0; x < kGrid; ++x)
+        now[static_cast<std::size_t>(y * kGrid + x)] = mean(frame, x, y);
+    }
+    const double sum = std::accumulate(now.begin(), now.end(), 0.0);
+    for (double& value : now) value -= sum / static_cast<double>(now.size());
+    const auto dot = [](const auto& a, const auto& b) {
+      return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+    };
+    const bool same = dot(now, last_) >= kSameScene * std::sqrt(dot(now, now) * dot(last_, last_));
+    last_ = now;
+    return !same;
+  }
+
+ private:
+  static constexpr int kGrid = 12;
+  /// Least correlation of two grids of one scene. Lower: a photo of something else continues the
+  /// one before; higher: fast motion in a video's frames restarts the tracker. [0.75, 0.9]
+  static constexpr double kSameScene = 0.8;
+
+  static double mean(const GrayImage& frame, int column, int row) {
+    const int left = frame.width * column / kGrid;
+    const int right = std::max(left + 1, frame.width * (column + 1) / kGrid);
+    const int top = frame.height * row / kGrid;
+    const int bottom = std::max(top + 1, frame.height * (row + 1) / kGrid);
+    double sum = 0;
+    for (int y = top; y < bottom; ++y) {
+      const std::uint8_t* line = frame.pixels + y * frame.stride;
+      sum = std::accumulate(line + left, line + right, sum);
+    }
+    return sum / ((right - left) * (bottom - top));
+  }
+
+  std::array<double, kGrid * kGrid> last_{};
+};
+
 /// One picture, or those of a folder in the order of their names.
 class PictureSource final : public FrameSource {
  public:
   explicit PictureSource(std::vector<std::string> paths) : paths_(std::move(paths)) {}
 
-  [[nodiscard]] SourceInfo info() const override { return {kDefaultFps, paths_.size(), false}; }
+  [[nodiscard]] SourceInfo info() const override {
+    return {kDefaultFps, paths_.size(), false, true};
+  }
 
   Result<bool> next(Frame& frame) override {
     if (stopped_ || next_ == paths_.size()) return false;
@@ -93,6 +140,7 @@ class PictureSource final : public FrameSource {
     } catch (const std::exception& error) {
       return damaged(path, std::string("OpenCV: ") + error.what());
     }
+    frame.new_scene = scene_.step(frame.gray_image());
     frame.index = next_;
     frame.time_s = static_cast<double>(next_) / kDefaultFps;
     ++next_;
@@ -103,6 +151,7 @@ class PictureSource final : public FrameSource {
 
  private:
   std::vector<std::string> paths_;
+  SceneChange scene_;
   std::size_t next_ = 0;
   std::atomic<bool> stopped_{false};
 };
@@ -193,7 +242,7 @@ class VideoClip final : public ClipReader {
       MODAR_TRY(decode());
     }
     if (pictures_ > 0) return another;
-    show_next();  // what begins later than the file stands for it until then
+    show_next();  // a track that begins later than the file represents it until then
     MODAR_TRY(decode());
     return true;
   }
@@ -284,7 +333,7 @@ cv::Mat wrap(const RgbaView& image) {
   return {image.height, image.width, CV_8UC4, const_cast<std::uint8_t*>(image.pixels.data())};
 }
 
-/// The encoder writes beside the movie's place; finish() puts it there.
+/// The encoder writes to a file next to the movie's place; finish() puts it there.
 class Movie final : public FrameSink {
  public:
   Movie(std::string path, double fps)

@@ -77,7 +77,7 @@ class ContactSheet {
   std::uint64_t count_ = 0;
 };
 
-/// The picture that stands for the movie until it is played: the first one with a model at or after
+/// The picture shown until the movie is played: the first one with a model at or after
 /// each power of two takes the place of the last, so that it comes from a run's second half where
 /// it can, and few are copied.
 class Poster {

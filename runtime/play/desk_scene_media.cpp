@@ -100,7 +100,7 @@ class Speaker {
     return device_ != 0;
   }
 
-  /// What is queued stays for play().
+  /// Queued sound stays for play().
   void pause() { SDL_PauseAudioDevice(device_, 1); }
 
   /// Fills the queue, and sounds. volume: 0 to 1.
@@ -190,8 +190,8 @@ class DeskSceneMedia final : public SceneMedia {
     }
   }
 
-  const SceneLog& obey(std::span<const SceneCommand> commands, std::span<const SceneEvent> events,
-                       Controls& controls) override {
+  const SceneState& execute(std::span<const SceneCommand> commands,
+                            std::span<const SceneEvent> events, Controls& controls) override {
     log_.commands.clear();
     log_.told.clear();
     const bool tapped = std::any_of(events.begin(), events.end(), [](const SceneEvent& event) {
@@ -304,7 +304,7 @@ class DeskSceneMedia final : public SceneMedia {
   BundleView bundle_;
   SceneMediaSetup setup_;
   std::vector<Clip> clips_;
-  SceneLog log_;
+  SceneState log_;
   std::string title_;  ///< the caption in the window's title
   double time_s_ = 0;
   float volume_ = 1;

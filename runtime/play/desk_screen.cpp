@@ -64,8 +64,8 @@ const KeyAct* act_of(SDL_Keycode key) {
   return found == std::end(kKeys) ? nullptr : found;
 }
 
-/// Window coordinates to pixels of the picture, which stands in the window's middle as large as it
-/// fits (Renderer::blit_to_window()).
+/// Window coordinates to pixels of the picture, which is centred in the window as large as it fits
+/// (Renderer::blit_to_window()).
 glm::dvec2 picture_point(SDL_Window* window, glm::dvec2 picture, int x, int y) {
   int width = 1;
   int height = 1;

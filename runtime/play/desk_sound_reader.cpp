@@ -60,7 +60,7 @@ class FfmpegSound final : public SoundReader {
  public:
   explicit FfmpegSound(std::span<const std::byte> file) : input_{file} {}
 
-  /// What is wrong, or null.
+  /// The fault, or null.
   const char* open() {
     av_log_set_level(AV_LOG_QUIET);
     auto* buffer = static_cast<std::uint8_t*>(av_malloc(kBufferBytes));
@@ -170,7 +170,7 @@ Result<std::unique_ptr<SoundReader>> open_sound(std::span<const std::byte> file,
   auto sound = std::make_unique<FfmpegSound>(file);
   if (const char* fault = sound->open()) {
     return fail(ExitCode::kInvalidInput, "input.damaged", name, fault,
-                "`modar check BUNDLE` says what is wrong with it");
+                "`modar check BUNDLE` reports its fault");
   }
   return sound;
 }

@@ -86,7 +86,6 @@ Result<BundleContent> content_of(const cv::Mat& flat, const ParameterSetRecord& 
                 "too little is found on it to know it again",
                 "take a pattern with more texture, or hold the camera closer");
   }
-  MODAR_ASSIGN(std::string yml, features_to_yml(features));
   BundleContent content;
   PatternRecord pattern{};
   pattern.name = content.intern("on the spot");
@@ -101,7 +100,7 @@ Result<BundleContent> content_of(const cv::Mat& flat, const ParameterSetRecord& 
   set.name = content.intern(parameter_set_name(set.id));
   content.parameter_sets.push_back(set);
   content.features.push_back({{set.id, features.descriptor_bytes, std::move(features.keypoints),
-                               std::move(features.descriptors), std::move(yml)}});
+                               std::move(features.descriptors), ""}});
   return content;
 }
 

@@ -52,7 +52,7 @@ class DeviceNode final : public VideoDevice {
     return maps_.back();
   }
 
-  Wake::Event wait(const Wake& wake, std::chrono::milliseconds limit) override {
+  WakeEvent::Event wait(const WakeEvent& wake, std::chrono::milliseconds limit) override {
     return wake.wait(descriptor_, limit);
   }
 
@@ -63,10 +63,11 @@ class DeviceNode final : public VideoDevice {
 
 class CameraSource final : public FrameSource {
  public:
-  CameraSource(std::unique_ptr<VideoDevice> device, std::string name, const CameraWish& wish)
-      : device_(std::move(device)), name_(std::move(name)), wish_(wish) {
+  CameraSource(std::unique_ptr<VideoDevice> device, std::string name,
+               const CaptureFormat& requested)
+      : device_(std::move(device)), name_(std::move(name)), requested_(requested) {
     info_.live = true;
-    info_.fps = wish.fps;
+    info_.fps = requested.fps;
   }
 
   ~CameraSource() override {
@@ -90,12 +91,12 @@ class CameraSource final : public FrameSource {
 
   Result<bool> next(Frame& frame) override {
     for (;;) {
-      switch (device_->wait(wake_, wish_.patience)) {
-        case Wake::Event::kStopped:
+      switch (device_->wait(wake_, requested_.patience)) {
+        case WakeEvent::Event::kStopped:
           return false;
-        case Wake::Event::kTimeout:
+        case WakeEvent::Event::kTimeout:
           return lost("it sends no frames any more");
-        case Wake::Event::kReadable:
+        case WakeEvent::Event::kReadable:
           break;
       }
       const Result<bool> taken = take(frame);
@@ -128,13 +129,13 @@ class CameraSource final : public FrameSource {
                 "try the next one: camera:1");
   }
 
-  /// The first of kFormats that the device takes as it is.
+  /// The first of kFormats that the device accepts unchanged.
   Result<void> choose_format() {
     for (const Offered& offered : kFormats) {
       v4l2_format format{};
       format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-      format.fmt.pix.width = static_cast<std::uint32_t>(wish_.width);
-      format.fmt.pix.height = static_cast<std::uint32_t>(wish_.height);
+      format.fmt.pix.width = static_cast<std::uint32_t>(requested_.width);
+      format.fmt.pix.height = static_cast<std::uint32_t>(requested_.height);
       format.fmt.pix.pixelformat = offered.fourcc;
       format.fmt.pix.field = V4L2_FIELD_NONE;
       if (const int error = device_->control(VIDIOC_S_FMT, &format); error == EBUSY) {
@@ -159,11 +160,11 @@ class CameraSource final : public FrameSource {
                 "convert it: ffmpeg -i /dev/video0 -f yuv4mpegpipe - | modar-play ... --input -");
   }
 
-  /// A wish: a camera that ignores it plays at its own rate.
+  /// The requested rate: a camera that ignores it plays at its own rate.
   void choose_rate() {
     v4l2_streamparm rate{};
     rate.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-    rate.parm.capture.timeperframe = {1000, static_cast<std::uint32_t>(wish_.fps * 1000)};
+    rate.parm.capture.timeperframe = {1000, static_cast<std::uint32_t>(requested_.fps * 1000)};
     if (device_->control(VIDIOC_S_PARM, &rate) != 0) return;
     const v4l2_fract each = rate.parm.capture.timeperframe;
     if (each.numerator > 0 && each.denominator > 0) {
@@ -222,14 +223,14 @@ class CameraSource final : public FrameSource {
 
   std::unique_ptr<VideoDevice> device_;
   std::string name_;
-  CameraWish wish_;
+  CaptureFormat requested_;
   SourceInfo info_;
   YuvFormat format_;
   std::vector<std::span<const std::uint8_t>> buffers_;
   std::uint64_t next_ = 0;
   std::int64_t first_ns_ = 0;
   bool streaming_ = false;
-  Wake wake_;
+  WakeEvent wake_;
 };
 
 }  // namespace
@@ -243,8 +244,9 @@ Result<std::unique_ptr<VideoDevice>> open_video_device(const std::string& path) 
 }
 
 Result<std::unique_ptr<FrameSource>> start_camera(std::unique_ptr<VideoDevice> device,
-                                                  const std::string& name, const CameraWish& wish) {
-  auto source = std::make_unique<CameraSource>(std::move(device), name, wish);
+                                                  const std::string& name,
+                                                  const CaptureFormat& requested) {
+  auto source = std::make_unique<CameraSource>(std::move(device), name, requested);
   MODAR_TRY(source->start());
   return source;
 }

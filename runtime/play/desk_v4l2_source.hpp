@@ -13,7 +13,7 @@
 
 namespace modar {
 
-/// The four calls that the source needs of a device node; a test brings a camera of its own.
+/// The four calls that the source needs of a device node; a test provides its own camera.
 class VideoDevice {
  public:
   VideoDevice() = default;
@@ -26,13 +26,13 @@ class VideoDevice {
   /// The buffer at that offset; empty where it cannot be mapped. The device unmaps it at its end.
   virtual std::span<const std::uint8_t> map(std::size_t length, std::uint32_t offset) = 0;
   /// Waits for a frame.
-  virtual Wake::Event wait(const Wake& wake, std::chrono::milliseconds limit) = 0;
+  virtual WakeEvent::Event wait(const WakeEvent& wake, std::chrono::milliseconds limit) = 0;
 };
 
 /// /dev/videoN. Errors: kIo "input.open".
 Result<std::unique_ptr<VideoDevice>> open_video_device(const std::string& path);
 
-struct CameraWish {
+struct CaptureFormat {
   int width = 1280;  ///< the device answers with the nearest that it has
   int height = 720;
   double fps = 30;
@@ -44,7 +44,8 @@ struct CameraWish {
 /// of YUYV, NV12, NV21, I420, gray), kIo "input.read"; later from next(): kIo "camera.lost" where
 /// it is unplugged or falls silent.
 Result<std::unique_ptr<FrameSource>> start_camera(std::unique_ptr<VideoDevice> device,
-                                                  const std::string& name, const CameraWish& wish);
+                                                  const std::string& name,
+                                                  const CaptureFormat& requested);
 
 /// The number behind "camera" or "camera:N". Errors: kUsage "input.camera".
 Result<int> camera_number(const std::string& input);

@@ -1,9 +1,9 @@
-// The device's build has no exceptions, yet libstdc++ brings the machinery to throw, to demangle
+// The device's build has no exceptions, yet libstdc++ links the machinery to throw, to demangle
 // and to print them: 200 KB that could only end the program. These end it at once.
 //
 // operator new may be replaced by anybody; std::__throw_*() are libstdc++'s own hooks, which its
 // headers call where another library would throw; std::terminate() and the names of the C++ ABI are
-// what its threads and guarded statics refer to: left to the library, they bring the whole stack
+// what its threads and guarded statics refer to: left to the library, they link the whole stack
 // unwinder (33 KB), which has nothing to read here, for our objects carry no unwind tables.
 #include <cstdio>
 #include <cstdlib>

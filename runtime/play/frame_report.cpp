@@ -201,7 +201,7 @@ void reasons(Writer& writer, const RunStats& stats) {
   });
 }
 
-void scene(Writer& writer, const SceneLog& log) {
+void scene(Writer& writer, const SceneState& log) {
   if (!log.commands.empty()) {
     array(writer, "commands", [&] {
       for (const std::string& each : log.commands) text(writer, each);

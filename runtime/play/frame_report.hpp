@@ -46,12 +46,13 @@ struct CameraReport {
   bool given = false;  ///< by somebody; else estimated or, by the ModAR paper's method, assumed
 };
 
-/// What the bundle's actions asked for in one frame, and what is heard in it.
-struct SceneLog {
+/// Requests of the bundle's actions in one frame, and the sound in it.
+struct SceneState {
   /// "play NODE", "pause NODE", "text NODE" or "link ADDRESS", as the actions asked for it.
   std::vector<std::string> commands;
-  std::string caption;  ///< what is heard, in one language; lines end with a line feed but the last
-  std::string told;     ///< lines for the user: labels' words, addresses, captions that begin
+  std::string
+      caption;  ///< the spoken captions, in one language; lines end with a line feed but the last
+  std::string told;  ///< lines for the user: labels' words, addresses, captions that begin
 };
 
 struct FrameReport {
@@ -62,7 +63,7 @@ struct FrameReport {
   Shown state = Shown::kHidden;
   CameraReport camera;
   StageTimes ms{};
-  const SceneLog* scene = nullptr;  ///< of the frame; null: nothing acts
+  const SceneState* scene = nullptr;  ///< of the frame; null: nothing acts
 
   double& at(Stage stage) { return ms[static_cast<std::size_t>(stage)]; }
   [[nodiscard]] double at(Stage stage) const { return ms[static_cast<std::size_t>(stage)]; }
@@ -174,7 +175,7 @@ class QosLog {
   /// every_s: seconds of a window by the frames' own clock. Errors: kIo.
   static Result<QosLog> create(const std::string& path, const QosHead& head, double every_s = 1);
 
-  /// True where this frame completes a window: then call window() with the memory as it is.
+  /// True where this frame completes a window: then call window() with the memory unchanged.
   [[nodiscard]] bool due(const FrameReport& report) const;
   Result<void> add(const FrameReport& report, std::span<const std::string> pattern_names);
   Result<void> window(const MemoryByKind& memory);

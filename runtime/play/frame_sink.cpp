@@ -57,7 +57,7 @@ Result<void> check_folder(const std::string& folder, const PlayOptions& options)
   return {};
 }
 
-/// An input that lies in the output's folder under a name that will be written.
+/// An input in the output's folder whose name will be written.
 bool will_be_replaced(const std::string& input, const std::string& folder) {
   const std::size_t slash = input.rfind('/');
   const std::string name = slash == std::string::npos ? input : input.substr(slash + 1);

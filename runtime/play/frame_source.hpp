@@ -18,6 +18,7 @@ struct Frame {
   double time_s = 0;            ///< since the first frame; of a file: index / rate
   double read_ms = 0;           ///< that reading it took
   std::int64_t arrived_ns = 0;  ///< steady clock when it was complete
+  bool new_scene = false;       ///< of stills: it does not continue the frame before
   int width = 0;
   int height = 0;
   PictureFormat format = PictureFormat::kRgb;  ///< kRgb: the picture is in rgb, else in yuv
@@ -32,7 +33,7 @@ struct Frame {
   [[nodiscard]] GrayImage gray_image() const {
     return {gray.empty() ? yuv.data() : gray.data(), width, height, width};
   }
-  /// What is drawn behind the models.
+  /// The picture behind the models.
   [[nodiscard]] CameraPicture picture() const;
 };
 
@@ -40,6 +41,7 @@ struct SourceInfo {
   double fps = 30;           ///< frames a second; 30 where the source does not say
   std::uint64_t frames = 0;  ///< 0: unknown
   bool live = false;         ///< frames come whether we are ready or not
+  bool stills = false;       ///< pictures, which may have nothing to do with each other
 };
 
 class FrameSource {

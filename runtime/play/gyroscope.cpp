@@ -11,7 +11,7 @@ namespace modar {
 namespace {
 
 /// Takes the first word off the text.
-std::string_view take_word(std::string_view& text) {
+std::string_view parse_word(std::string_view& text) {
   constexpr std::string_view kBlanks = " \t\r,";
   const std::size_t start = std::min(text.find_first_not_of(kBlanks), text.size());
   const std::size_t end = std::min(text.find_first_of(kBlanks, start), text.size());
@@ -42,7 +42,7 @@ Result<std::vector<glm::dvec3>> read_gyroscope(const std::string& path) {
     glm::dvec3 turn(0.0);
     int count = 0;
     bool good = true;
-    for (std::string_view word = take_word(line); !word.empty(); word = take_word(line)) {
+    for (std::string_view word = parse_word(line); !word.empty(); word = parse_word(line)) {
       good = good && count < 3 && parse_signed(word, turn[count]);
       ++count;
     }

@@ -1,4 +1,4 @@
-// A gyroscope's record beside a video: how the camera turned from frame to frame.
+// A gyroscope's record next to a video: how the camera turned from frame to frame.
 #pragma once
 
 #include <string>

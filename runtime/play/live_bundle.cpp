@@ -28,7 +28,7 @@ Result<std::shared_ptr<const LiveBundle>> BundleWatch::look() {
   state_ = std::move(state);
   MODAR_ASSIGN(MappedFile file, MappedFile::open(path_));
   auto live = std::make_shared<LiveBundle>(LiveBundle{std::move(file), {}});
-  Result<BundleView> view = BundleView::open(live->file.bytes());
+  Result<BundleView> view = open_bundle(live->file);
   if (!view) {
     Error error = view.error();
     error.where = path_ + ":" + error.where;

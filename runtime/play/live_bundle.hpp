@@ -1,4 +1,4 @@
-// --live: the bundle's file, opened again whenever another one stands in its place.
+// --live: the bundle's file, opened again whenever another one replaced it.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ class BundleWatch {
 
  private:
   std::string path_;
-  std::string state_;  ///< inode, size and time of what was seen last
+  std::string state_;  ///< inode, size and time of the last file
   std::int64_t next_ns_ = 0;
 };
 

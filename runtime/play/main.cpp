@@ -69,7 +69,7 @@ TrackStep with_gray_of_rgb(TrackStep track) {
 }
 
 /// Plays the bundle's scenes over the frames of --input or --golden; answers the exit code.
-Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
+Result<int> play_video(const PlayOptions& asked, const BundleView& bundle, const MappedFile& file) {
   MODAR_ASSIGN(Plan plan, make_plan(asked, bundle));
   PlayOptions options = asked;
   options.method = choose_method(bundle, plan.method, plan.parameters);
@@ -91,14 +91,16 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
     MODAR_ASSIGN(turns, read_gyroscope(options.gyro));
   }
   MODAR_ASSIGN(auto source, open_frame_source(plan.input));
-  const SourceInfo info = source->info();
+  SourceInfo info = source->info();
+  if (plan.golden) info.stills = plan.golden->head().stills;
   // Only where frames may be dropped may a result depend on time.
   const bool newest = info.live || options.realtime;
   SpotSlot spot;
   LiveSlot live;
-  MODAR_ASSIGN(TrackStep track, open_vision(bundle, {options.method == "ours", set, plan.camera,
-                                                     &spot, options.live ? &live : nullptr, newest,
-                                                     options.extended, std::move(turns)}));
+  MODAR_ASSIGN(TrackStep track,
+               open_vision(bundle, {options.method == "ours", set, plan.camera, &spot,
+                                    options.live ? &live : nullptr, newest, options.extended,
+                                    std::move(turns), info.stills}));
 
   Player player(options, bundle);
   const std::string name(bundle.name(parameter_set(bundle, set).name));
@@ -112,26 +114,34 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle) {
   if (newest) how.delivery = Delivery::kNewest;
   how.idle = [&player] { return player.idle(); };
   catch_interrupts();
-  MODAR_ASSIGN(const PipelineCounts counts,
-               run_pipeline(
-                   *source, track, [&player](const Job& job) { return player.show(job); }, how));
-  return player.finish(counts);
+  // With --live, a bundle that is written to is opened again.
+  const auto intact = [&] { return options.live ? Result<void>() : file.intact(); };
+  const auto show = [&](const Job& job) -> Result<bool> {
+    MODAR_TRY(intact());
+    return player.show(job);
+  };
+  Result<PipelineCounts> counts = run_pipeline(*source, track, show, how);
+  MODAR_TRY(intact());
+  if (!counts) return tl::unexpected(std::move(counts.error()));
+  return player.finish(*counts);
 }
 
 Result<int> run(const PlayOptions& options) {
   MODAR_TRY(check_outputs(options));
   MODAR_ASSIGN(MappedFile file, MappedFile::open(options.bundle));
-  Result<BundleView> bundle = BundleView::open(file.bytes());
+  Result<BundleView> bundle = open_bundle(file);
   if (bundle && options.verify) {
     if (auto whole = verify_sections(*bundle); !whole) bundle = tl::unexpected(whole.error());
   }
   if (!bundle) {
     Error error = bundle.error();
-    error.where = options.bundle + (error.where.empty() ? "" : ":" + error.where);
+    if (error.where != options.bundle) {
+      error.where = options.bundle + (error.where.empty() ? "" : ":" + error.where);
+    }
     return tl::unexpected(error);
   }
-  if (options.turntable == 0) return play_video(options, *bundle);
-  MODAR_TRY(play_turntable(options, *bundle));
+  if (options.turntable == 0) return play_video(options, *bundle, file);
+  MODAR_TRY(play_turntable(options, *bundle, file));
   return 0;
 }
 
@@ -158,5 +168,6 @@ int start(int argc, char** argv) {
 }  // namespace modar
 
 int main(int argc, char** argv) {
+  modar::guard_mapped_files();
   return modar::start(argc, argv);
 }

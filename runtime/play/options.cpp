@@ -200,11 +200,11 @@ Tracking:
   --camera FILE.yml   camera matrix and distortion in OpenCV's format (default: the focal length
                       starts at the frame's longer side and is estimated, as --json reports; see
                       also modar calibrate)
-  --extended          learn the static surroundings of a pattern, and go on while the pattern is
-                      covered or out of view
+  --extended          learn the static surroundings of a pattern, and continue while the
+                      pattern is covered or out of view
   --smooth MS         steady models at rest, which may lag by this much (default: 0, off)
-  --outline           draw the outline of each visible pattern (amber while it is extended), as is
-                      done where nothing stands on any
+  --outline           draw the outline of each visible pattern (amber while it is extended), the
+                      default if no pattern has content
 )";
   constexpr const char* kMore =
       R"(  --gyro FILE         with --extended: rotations of the camera, one line per frame with the rotation

@@ -25,7 +25,7 @@ struct PlayOptions {
   std::string gyro;              ///< file of a gyroscope's turns; empty: none
   std::string method;            ///< "ours", "paper"; empty: see choose_method()
   std::string parameters;        ///< empty: orb-2000 where the bundle has it, else its first
-  std::string device;            ///< empty: the context as it is
+  std::string device;            ///< empty: the context unchanged
   double tolerance = 0.5;        ///< pixels; of --golden
   double smooth_ms = 0;          ///< latency that smoothing may add; 0: off
   std::uint64_t gpu_budget = 0;  ///< bytes; 0: the device's
@@ -33,7 +33,7 @@ struct PlayOptions {
   int width = 640;               ///< of turntable pictures
   int height = 480;
   bool json = false;
-  bool extended = false;    ///< go on from the surroundings of a pattern that is not seen
+  bool extended = false;    ///< continue from the surroundings of a pattern that is not visible
   bool homography = false;  ///< each pattern's in the JSON lines
   bool force = false;       ///< into folders that hold other files
   bool window = false;
@@ -53,7 +53,7 @@ struct PlayOptions {
 /// arguments: argv without the program's name. Errors: kUsage "usage.*" (the cure names --help).
 Result<PlayOptions> parse_options(std::span<const char* const> arguments);
 
-/// "64M", "1G", "512K" or plain bytes; 0 where it is none of these.
+/// "64M", "1G", "512K" or plain bytes; 0 for any other.
 std::uint64_t parse_bytes(std::string_view text);
 
 /// What --help prints, or with `all` --help-all.

@@ -40,7 +40,7 @@ bool clip(const Canvas& canvas, double margin, glm::dvec2& from, glm::dvec2& to)
   return true;
 }
 
-/// Pixels of one row that can lie within `reach` of the segment.
+/// Pixels of one row that can be within `reach` of the segment.
 std::array<int, 2> row_span(const Canvas& canvas, int y, glm::dvec2 from, glm::dvec2 to,
                             double reach) {
   double left = std::min(from.x, to.x);

@@ -1,4 +1,4 @@
-// What is painted on a finished picture: outlines of patterns, and the small on-screen display.
+// Painted on a finished picture: outlines of patterns, and the small on-screen display.
 #pragma once
 
 #include <array>
@@ -29,7 +29,7 @@ struct Canvas {
   int height = 0;
 };
 
-/// A smooth line of that width in pixels, clipped to the canvas. Pixel centres lie on whole
+/// A smooth line of that width in pixels, clipped to the canvas. Pixel centres are at whole
 /// numbers.
 void draw_line(const Canvas& canvas, glm::dvec2 from, glm::dvec2 to, double line_width,
                Colour colour);

@@ -13,19 +13,19 @@
 
 namespace modar {
 
-Wake::Wake() : event_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
+WakeEvent::WakeEvent() : event_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
 
-Wake::~Wake() {
+WakeEvent::~WakeEvent() {
   if (event_ >= 0) close(event_);
 }
 
-void Wake::stop() {
+void WakeEvent::stop() {
   const std::uint64_t one = 1;
   // It cannot fail but by a full counter, which is awake already.
   [[maybe_unused]] const ssize_t written = write(event_, &one, sizeof one);
 }
 
-Wake::Event Wake::wait(int descriptor, std::chrono::milliseconds limit) const {
+WakeEvent::Event WakeEvent::wait(int descriptor, std::chrono::milliseconds limit) const {
   // Nobody reads the event: once stopped, it stays so. poll() skips negative descriptors.
   std::array<pollfd, 2> files = {{{event_, POLLIN, 0}, {descriptor, POLLIN, 0}}};
   int ready = 0;
@@ -37,7 +37,7 @@ Wake::Event Wake::wait(int descriptor, std::chrono::milliseconds limit) const {
   return files[1].revents != 0 ? Event::kReadable : Event::kTimeout;
 }
 
-Wake::Event Wake::wait_for_stop(std::chrono::milliseconds limit) const {
+WakeEvent::Event WakeEvent::wait_for_stop(std::chrono::milliseconds limit) const {
   return wait(-1, limit);
 }
 

@@ -18,12 +18,12 @@
 
 namespace modar {
 
-class Wake {
+class WakeEvent {
  public:
-  Wake();
-  Wake(const Wake&) = delete;
-  Wake& operator=(const Wake&) = delete;
-  ~Wake();
+  WakeEvent();
+  WakeEvent(const WakeEvent&) = delete;
+  WakeEvent& operator=(const WakeEvent&) = delete;
+  ~WakeEvent();
 
   /// From any thread: each wait() answers kStopped from now on.
   void stop();
@@ -40,7 +40,7 @@ class Wake {
 };
 
 enum class Delivery : std::uint8_t {
-  kNewest,   ///< one slot; a post replaces what was not taken yet; post never waits
+  kNewest,   ///< one slot; a post replaces one that was not taken yet; post never waits
   kInOrder,  ///< two slots; a post waits for a free one; nothing is dropped
 };
 
@@ -90,7 +90,7 @@ class Mailbox {
     return take_ready(item) ? Taken::kItem : Taken::kClosed;
   }
 
-  /// No more posts; what was posted can still be taken. Wakes both sides.
+  /// No more posts; the last post can still be taken. Wakes both sides.
   void close() {
     guard_.acquire();
     closed_ = true;
@@ -145,7 +145,7 @@ struct Job {
   Camera camera;  ///< of this frame's size
   TrackResult track;
   double track_ms = 0;
-  std::shared_ptr<const SpotPattern> spot;  ///< what `track` is about; null: the bundle's patterns
+  std::shared_ptr<const SpotPattern> spot;  ///< the pattern of `track`; null: the bundle's patterns
   std::shared_ptr<const LiveBundle> live;   ///< that bundle; null: the one that was opened first
 };
 

@@ -83,7 +83,7 @@ Player::Player(const PlayOptions& options, const BundleView& bundle)
       bundle_(bundle),
       watch_(options.bundle),
       names_(pattern_names(bundle)),
-      hysteresis_(names_.size(), options.method != "paper"),
+      hysteresis_(names_.size()),
       smoother_(names_.size(), options.smooth_ms),
       controls_(bundle, options.outline || is_bare(bundle), options.osd || options.window),
       progress_(!options.quiet) {
@@ -93,9 +93,9 @@ Player::Player(const PlayOptions& options, const BundleView& bundle)
 
 Result<void> Player::open(const PlayerSetup& setup) {
   setup_ = setup;
+  restart_scene();
   if (is_bare(bundle_) && !options_.quiet) {
-    std::fputs("modar-play: nothing stands on a pattern of the bundle; outlines are drawn\n",
-               stderr);
+    std::fputs("modar-play: no pattern of the bundle has content; outlines are drawn\n", stderr);
   }
   MODAR_ASSIGN(auto screen, Screen::open(bundle_, options_));
   screen_ = std::move(screen);
@@ -104,7 +104,13 @@ Result<void> Player::open(const PlayerSetup& setup) {
   return open_logs();
 }
 
-/// What is heard fits only frames that come at their own time.
+/// Nothing of the frames before shows any more.
+void Player::restart_scene() {
+  hysteresis_ = Hysteresis(names_.size(), options_.method != "paper", setup_.source.stills);
+  smoother_ = PoseSmoother(names_.size(), options_.smooth_ms);
+}
+
+/// Sound fits only frames that come at their own time.
 void Player::open_media() {
   media_ = open_scene_media(bundle_, {setup_.source.live || options_.realtime, options_.sound});
 }
@@ -126,10 +132,10 @@ Result<void> Player::open_sinks() {
 
 Result<void> Player::open_logs() {
   if (!options_.record.empty()) {
-    MODAR_ASSIGN(
-        auto recorder,
-        Recorder::create(options_.record, {options_.method, setup_.parameters, setup_.source.fps,
-                                           bundle_.header().hash, setup_.camera}));
+    MODAR_ASSIGN(auto recorder,
+                 Recorder::create(options_.record,
+                                  {options_.method, setup_.parameters, setup_.source.fps,
+                                   bundle_.header().hash, setup_.camera, setup_.source.stills}));
     recorder_ = std::move(recorder);
   }
   if (options_.qos.empty()) return {};
@@ -182,12 +188,11 @@ void Player::follow_spot(const Job& job) {
   if (job.spot == spot_) return;
   spot_ = job.spot;
   names_ = pattern_names(spot_ ? spot_->view : bundle_);
-  hysteresis_ = Hysteresis(names_.size(), options_.method != "paper");
-  smoother_ = PoseSmoother(names_.size(), options_.smooth_ms);
+  restart_scene();
 }
 
 /// The vision thread looks for the patterns of a newer version of the bundle: it is drawn from now
-/// on. What is shown stays where the patterns are the same ones.
+/// on. The view stays if the patterns are the same.
 Result<void> Player::follow_live(const Job& job) {
   if (job.live == live_ || !job.live) return {};
   MODAR_TRY(screen_->load(job.live->view));
@@ -199,9 +204,8 @@ Result<void> Player::follow_live(const Job& job) {
       std::max(bundle_.scenes().size() + bundle_.nodes().size(), bundle_.patterns().size()));
   std::vector<std::string> names = pattern_names(bundle_);
   if (!spot_ && names != names_) {
-    hysteresis_ = Hysteresis(names.size(), options_.method != "paper");
-    smoother_ = PoseSmoother(names.size(), options_.smooth_ms);
     names_ = std::move(names);
+    restart_scene();
   }
   if (!options_.quiet) {
     progress_.end();
@@ -211,7 +215,7 @@ Result<void> Player::follow_live(const Job& job) {
   return {};
 }
 
-/// Hysteresis, what to draw, and all of the report that stands before drawing.
+/// Hysteresis, what to draw, and all of the report before drawing.
 FrameReport Player::begin_report(const Job& job) {
   FrameReport report;
   report.frame = job.frame.index;
@@ -230,6 +234,7 @@ FrameReport Player::begin_report(const Job& job) {
   report.at(Stage::kPose) = job.track.times.pose;
   report.at(Stage::kTrack) = job.track_ms;
 
+  if (setup_.source.stills && job.frame.new_scene) restart_scene();
   drawn_.assign(report.visible.begin(), report.visible.end());
   report.at(Stage::kSmoothing) = smoother_.step(report.time_s, drawn_);
   const auto states = hysteresis_.step(drawn_);
@@ -246,7 +251,7 @@ FrameReport Player::begin_report(const Job& job) {
   return report;
 }
 
-/// What stands on the patterns as the actions have left it; clicks fall on what was drawn before.
+/// The content of the patterns after the actions; clicks hit the previous drawing.
 void Player::collect(std::span<const Hysteresis::State> states, const Job& job,
                      FrameReport& report) {
   events_.clear();
@@ -257,13 +262,13 @@ void Player::collect(std::span<const Hysteresis::State> states, const Job& job,
   if (media_) media_->advance(report.time_s, events_);
   const auto commands = controls_.collect(states, report.time_s, events_, items_);
   if (!media_) return;
-  report.scene = &media_->obey(commands, events_, controls_);
+  report.scene = &media_->execute(commands, events_, controls_);
   if (options_.quiet || report.scene->told.empty()) return;
   progress_.end();
   std::fputs(report.scene->told.c_str(), stderr);
 }
 
-/// A flat pattern's four corners, or the border of what is curved.
+/// A flat pattern's four corners, or the border of a curved one.
 void Player::outline(const Canvas& canvas, const Camera& camera, const Detection& seen,
                      Colour colour) const {
   PatternSurface surface;
@@ -276,7 +281,7 @@ void Player::outline(const Canvas& canvas, const Camera& camera, const Detection
   draw_outline(canvas, surface, camera, seen.pose, colour);
 }
 
-/// Outlines lie on the camera's picture, behind the models.
+/// Outlines are on the camera's picture, behind the models.
 void Player::draw(const Job& job, const FrameReport& report) {
   constexpr Colour kOutline{64, 255, 96};
   constexpr Colour kExtended{255, 176, 32};

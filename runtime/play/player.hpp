@@ -37,7 +37,7 @@ class Progress {
   std::int64_t last_ns_ = 0;
 };
 
-/// What a run is about, beside its options.
+/// Inputs of a run, apart from its options.
 struct PlayerSetup {
   SourceInfo source;
   std::uint32_t parameter_set = 0;  ///< id
@@ -74,6 +74,7 @@ class Player {
   void follow_spot(const Job& job);
   void collect(std::span<const Hysteresis::State> states, const Job& job, FrameReport& report);
   void open_media();
+  void restart_scene();
   void outline(const Canvas& canvas, const Camera& camera, const Detection& seen,
                Colour colour) const;
   void draw(const Job& job, const FrameReport& report);
@@ -96,7 +97,7 @@ class Player {
   std::vector<std::string> names_;  ///< of the patterns that are looked for
   Hysteresis hysteresis_;
   PoseSmoother smoother_;
-  std::vector<Detection> drawn_;  ///< what is seen, at smoothed poses
+  std::vector<Detection> drawn_;  ///< detections, at smoothed poses
   Controls controls_;
   std::vector<SceneEvent> events_;  ///< taps, and what ended
   Progress progress_;

@@ -47,7 +47,7 @@ std::uint8_t rounded(int value) {
   return static_cast<std::uint8_t>(std::clamp((value + (1 << (kShift - 1))) >> kShift, 0, 255));
 }
 
-/// Where a row's samples lie: pixel x has its chroma at chroma[(x >> shift) * step].
+/// The places of a row's samples: pixel x has its chroma at chroma[(x >> shift) * step].
 struct Row {
   const std::uint8_t* y;
   const std::uint8_t* u;
@@ -303,8 +303,8 @@ Result<void> read_tag(RawInput& raw, std::string_view tag) {
       if (!read_number(value, raw.format.height)) return bad_header("its height is not a number");
       break;
     case 'F':
-      // 0:0 stands for an unknown rate.
-      if (value != "0:0" && !read_rate(value, ':', raw.fps)) return bad_header("its rate is none");
+      // 0:0 means an unknown rate.
+      if (value != "0:0" && !read_rate(value, ':', raw.fps)) return bad_header("it has no rate");
       break;
     case 'C': {
       const Named* named = find(kY4m, value);
@@ -394,7 +394,7 @@ class RawSource final : public FrameSource {
   Result<std::size_t> read_some(std::span<std::uint8_t> bytes) {
     std::size_t done = 0;
     while (done < bytes.size()) {
-      if (wake_.wait(descriptor_) == Wake::Event::kStopped) {
+      if (wake_.wait(descriptor_) == WakeEvent::Event::kStopped) {
         stopped_ = true;
         break;
       }
@@ -432,7 +432,7 @@ class RawSource final : public FrameSource {
   std::vector<std::uint8_t> bytes_;
   std::uint64_t next_ = 0;
   bool stopped_ = false;
-  Wake wake_;
+  WakeEvent wake_;
 };
 
 }  // namespace
@@ -496,7 +496,7 @@ Result<RawInput> parse_y4m_header(std::string_view line) {
 }
 
 Result<std::unique_ptr<FrameSource>> open_raw_source(const std::string& input) {
-  // By hand: GCC 12 takes a move out of this Result for a use of what was never set.
+  // Explicitly: GCC 12 takes a move out of this Result for a use of an unset value.
   const Result<RawInput> raw = parse_raw_input(input);
   if (!raw) return tl::unexpected<Error>(raw.error());
   const int descriptor =

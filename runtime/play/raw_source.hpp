@@ -33,8 +33,8 @@ struct YuvFormat {
 /// Bytes of a frame without gaps; an odd side has one chroma sample more than its half.
 std::size_t frame_bytes(const YuvFormat& format);
 
-/// Fills the frame's size, rgb and gray by ITU-R BT.601, the nearest chroma sample each; gray is Y
-/// brought to the full range. bytes.size() >= frame_bytes(format).
+/// Fills the frame's size, rgb and gray by ITU-R BT.601, the nearest chroma sample each; grey is Y
+/// scaled to the full range. bytes.size() >= frame_bytes(format).
 void fill_frame(Frame& frame, const YuvFormat& format, std::span<const std::uint8_t> bytes);
 
 /// Makes the bytes the frame's by swapping them in, where the renderer can draw the layout (NV21,

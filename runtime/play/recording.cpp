@@ -35,6 +35,8 @@ std::string head_line(const RecordingHead& head) {
   writer.String(head.parameters.c_str());
   writer.Key("fps");
   writer.Double(head.fps);
+  writer.Key("stills");
+  writer.Bool(head.stills);
   // A string: JSON's numbers end at 2^53 for most readers.
   writer.Key("bundle_hash");
   writer.String(std::to_string(head.bundle_hash).c_str());
@@ -88,6 +90,8 @@ bool read_head(const Value& line, RecordingHead& head) {
       read_text(*object, "bundle_hash", hash) && read_numbers(member(*object, "camera"), c);
   if (!good || !(c[0] >= 0 && c[0] <= 65536 && c[1] >= 0 && c[1] <= 65536)) return false;
   head.fps = fps->GetDouble();
+  const Value* stills = member(*object, "stills");
+  head.stills = stills != nullptr && stills->IsBool() && stills->GetBool();
   head.bundle_hash = std::strtoull(hash.c_str(), nullptr, 10);
   head.camera.width = static_cast<int>(c[0]);
   head.camera.height = static_cast<int>(c[1]);
@@ -99,7 +103,7 @@ bool read_head(const Value& line, RecordingHead& head) {
   return true;
 }
 
-bool read_seen(const Value& value, RecordedFrame::Seen& seen) {
+bool read_seen(const Value& value, RecordedFrame::SeenPattern& seen) {
   const Value* corners = member(value, "corners");
   if (!read_text(value, "pattern", seen.pattern) || corners == nullptr || !corners->IsArray() ||
       corners->Size() != seen.corners.size()) {

@@ -14,13 +14,14 @@
 
 namespace modar {
 
-/// What a replay needs to do the same again, beside the frames and the bundle.
+/// What a replay needs in addition to the frames and the bundle.
 struct RecordingHead {
   std::string method;
   std::string parameters;  ///< name of the parameter set
   double fps = 30;
   std::uint64_t bundle_hash = 0;  ///< that of its header: it covers the section table's hashes
   Camera camera;                  ///< width 0: as default_camera() for each frame
+  bool stills = false;            ///< SourceInfo::stills
 };
 
 /// A folder with frames/frame_000000.png (.ppm on the device) and poses.jsonl: the head, then the
@@ -45,15 +46,15 @@ class Recorder {
   std::unique_ptr<State> state_;
 };
 
-/// One recorded frame: what is compared.
+/// One recorded frame: the compared fields.
 struct RecordedFrame {
   std::uint64_t frame = 0;
   std::string state;
-  struct Seen {
+  struct SeenPattern {
     std::string pattern;
     std::array<glm::dvec2, 4> corners{};
   };
-  std::vector<Seen> visible;
+  std::vector<SeenPattern> visible;
 };
 
 struct Recording {

@@ -18,10 +18,10 @@ struct PageFrame {
   bool seen = false;  ///< a pattern was measured
   int inliers = 0;    ///< greatest of the detections
   int matches = 0;
-  std::string patterns;  ///< names of what was seen, with commas
+  std::string patterns;  ///< names of detected patterns, with commas
 };
 
-/// Needs no file but overlay.mp4, poster.png and contact_sheet.png beside it, and no network. fps:
+/// Needs no file but overlay.mp4, poster.png and contact_sheet.png next to it, and no network. fps:
 /// of the movie, which shows one picture a PageFrame, in order.
 std::string report_page(const ReportTitle& title, double fps, std::span<const PageFrame> frames,
                         const RunStats& stats);

@@ -1,4 +1,4 @@
-// What a bundle's actions ask for beside what is drawn: its videos and sounds, and words for the
+// Requests of a bundle's actions other than drawing: its videos and sounds, and words for the
 // user. Desks only: the build of the device decodes and tells nothing.
 #pragma once
 
@@ -26,17 +26,17 @@ class SceneMedia {
   virtual void advance(double time_s, std::vector<SceneEvent>& events) = 0;
   /// What that step asked for, of these events, and what the user asks of sounds and captions.
   /// Answers the frame's log, which lives until the next call.
-  virtual const SceneLog& obey(std::span<const SceneCommand> commands,
-                               std::span<const SceneEvent> events, Controls& controls) = 0;
-  /// Brings the pictures and the caption of now to the screen. Errors: those of the library of
+  virtual const SceneState& execute(std::span<const SceneCommand> commands,
+                                    std::span<const SceneEvent> events, Controls& controls) = 0;
+  /// Updates the pictures and the caption on the screen. Errors: those of the library of
   /// media.
   virtual Result<void> show(Screen& screen) = 0;
-  /// The user's pause: nothing sounds. Time does not go on by itself.
+  /// The user's pause: nothing sounds. Time does not advance by itself.
   virtual void hold(bool on) = 0;
 };
 
 struct SceneMediaSetup {
-  bool audible = false;  ///< frames come at their own time: what is heard fits them
+  bool audible = false;  ///< frames come at their own time: the sound fits them
   bool sound = false;    ///< from the start
 };
 

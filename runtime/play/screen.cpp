@@ -11,8 +11,8 @@ namespace {
 /// Light enough for a shadow to be seen, and no colour that the model could be thought to have.
 constexpr glm::vec4 kTurntableGround{0.86f, 0.86f, 0.85f, 1.0f};
 
-/// A pixel, where the driver has so many. What GPUs of phones average on the way to memory, nearly
-/// for nothing; eight are seldom there.
+/// Samples per pixel, if the driver supports them. What GPUs of phones average on the way to
+/// memory, nearly for nothing; eight are seldom there.
 constexpr int kSamples = 4;
 
 }  // namespace
@@ -90,7 +90,7 @@ bool Screen::has_video(std::uint32_t node) const {
 }
 
 void Screen::show_video(std::uint32_t node, const RgbImage& image) {
-  GLint bound = 0;  // the renderer goes on from the state that it left
+  GLint bound = 0;  // the renderer continues from the state that it left
   glGetIntegerv(GL_TEXTURE_BINDING_2D, &bound);
   auto video = std::find_if(videos_.begin(), videos_.end(),
                             [node](const Video& each) { return each.node == node; });

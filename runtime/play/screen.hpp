@@ -43,7 +43,7 @@ class Window {
   /// Puts a new context in the place of the lost one and makes it current. Errors: kUnsupported
   /// "window.unsupported".
   Result<void> renew();
-  /// Brings what was drawn to the display.
+  /// Presents the drawing on the display.
   void swap();
   void set_title(const std::string& title);
 
@@ -70,7 +70,7 @@ class Screen {
   Result<void> resize(int width, int height);
   /// Draws the background and the items as the camera sees them.
   void draw(const CameraPicture& background, const Camera& camera, std::span<const DrawItem> items);
-  /// The same over the canvas as it was painted on.
+  /// The same over the painted canvas.
   void draw_on_canvas(const Camera& camera, std::span<const DrawItem> items);
   /// What a video's node shows from now on, instead of its poster. The pixels are copied.
   void show_video(std::uint32_t node, const RgbImage& image);
@@ -80,7 +80,7 @@ class Screen {
   RgbaView picture();
   Canvas canvas();
 
-  /// Shows what was drawn, or the canvas as it was painted on, in the window. Nothing without one.
+  /// Shows the drawing, or the painted canvas, in the window. Nothing without one.
   void present();
   void present_canvas();
   [[nodiscard]] bool has_window() const { return window_ != nullptr; }

@@ -25,7 +25,7 @@ struct SpotPattern {
 /// or one smaller than 24 pixels a side.
 Result<std::array<glm::dvec2, 4>> ordered_corners(const std::array<glm::dvec2, 4>& clicked);
 
-/// Rectifies what lies between the corners (pixels of the frame) and describes it with
+/// Rectifies the area between the corners (pixels of the frame) and describes it with
 /// `parameters`. Errors: those of ordered_corners(); kInvalidInput "spot.features" where nothing is
 /// found on it; kUnsupported "spot.unsupported" in a build without OpenCV.
 Result<std::shared_ptr<const SpotPattern>> make_spot_pattern(

@@ -1,4 +1,4 @@
-// What clicks and actions need beside drawing: left out of the build of the device, which has no
+// Clicks and actions, apart from drawing: left out of the build of the device, which has no
 // window.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 namespace modar {
 
-/// The tap on what lies under a pixel of the picture, if a node does.
+/// The tap on the node under a pixel of the picture, if any.
 std::optional<SceneEvent> tap_at(const BundleView& bundle, const Camera& camera, glm::dvec2 pixel,
                                  std::span<const DrawItem> items);
 

@@ -19,7 +19,7 @@
 namespace modar {
 namespace {
 
-constexpr double kTiltDegrees = 20;  ///< seen from a little above, as what stands on a table
+constexpr double kTiltDegrees = 20;  ///< seen from a little above, as an object on a table
 
 /// The ball round the origin that holds the model's chunks (model space).
 double radius_of(const BundleView& bundle, std::uint32_t model) {
@@ -90,7 +90,7 @@ Subject model_subject(const BundleView& bundle, std::uint32_t model) {
           {on_turntable(stand, model, glm::mat4(1.0f))}};
 }
 
-/// The pictures of a pattern as they stand there at first, videos with their posters.
+/// The first pictures of a pattern, videos with their posters.
 Subject pattern_subject(const BundleView& bundle, std::uint32_t pattern) {
   Subject subject{bundle.name(bundle.patterns()[pattern].name), 0, {}};
   add_items(bundle, ActionMachine(bundle), pattern, glm::mat4(1.0f), subject.items);
@@ -110,7 +110,8 @@ Subject subject_of(const BundleView& bundle, std::uint32_t n) {
 
 }  // namespace
 
-Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle) {
+Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle,
+                            const MappedFile& file) {
   constexpr double kFps = 30;
   const bool models = !bundle.models().empty();
   const std::size_t count = models ? bundle.models().size() : bundle.patterns().size();
@@ -144,6 +145,7 @@ Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle
       const std::int64_t before = now_ns();
       screen->draw({}, camera, items);
       const RgbaView picture = screen->picture();
+      MODAR_TRY(file.intact());
       turn.render_ms = ms_since(before);
       turn.triangles = screen->stats().triangles;
       turn.draw_calls = screen->stats().draw_calls;

@@ -40,8 +40,8 @@ struct OurVision {
     last_frame = frame;
   }
 
-  /// A newer bundle's loop works beside the one before it until it sees something too, or that sees
-  /// nothing any more: the pose is not lost on the way.
+  /// A newer bundle's loop runs in parallel with the previous one until it detects something too,
+  /// or the previous one detects nothing: the pose is not lost on the way.
   Result<void> follow_live(Job& job) {
     constexpr int kMostFrames = 60;  // two seconds: then the new one has no such pattern
     if (auto newer = options.live == nullptr ? nullptr : options.live->take()) {
@@ -64,6 +64,7 @@ struct OurVision {
   Result<void> step(Job& job) {
     const Frame& frame = job.frame;
     const std::int64_t before = now_ns();
+    if (options.stills && frame.new_scene) loop.reset();
     if (!loop || camera.width != frame.width || camera.height != frame.height) {
       camera = camera_for(options.camera, frame.width, frame.height);
       MODAR_ASSIGN(auto created, PoseLoop::create(bundle, camera, loop_options()));
@@ -109,9 +110,11 @@ Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::
     if (method == "ours") return 0;
     return fail(ExitCode::kInvalidInput, "tracker.no-patterns", "",
                 "the bundle contains no pattern for the paper's method",
-                "bake it with --pattern IMAGE, and without --parameters none");
+                std::string("bake it again with --parameters ") +
+                    (name.empty() ? kDefaultParameterSet : name.c_str()) +
+                    "; --parameters none and --device leave it out");
   }
-  const std::string_view wanted = name.empty() ? std::string_view("orb-2000") : name;
+  const std::string_view wanted = name.empty() ? std::string_view(kDefaultParameterSet) : name;
   std::string known;
   for (const ParameterSetRecord& set : sets) {
     const std::string_view each = bundle.name(set.name);
@@ -121,7 +124,8 @@ Result<std::uint32_t> choose_parameter_set(const BundleView& bundle, const std::
   }
   if (name.empty()) return sets[0].id;
   return fail(ExitCode::kUsage, "parameters.unknown", "--parameters",
-              "the bundle has no parameter set '" + name + "'", "it has: " + known);
+              "the bundle has no parameter set '" + name + "'",
+              "it has: " + known + "; `modar bake --parameters all` stores all four");
 }
 
 ParameterSetRecord parameter_set(const BundleView& bundle, std::uint32_t id) {

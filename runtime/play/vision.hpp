@@ -22,8 +22,9 @@ struct VisionOptions {
   SpotSlot* spot = nullptr;         ///< patterns made on the spot come here; may be null
   LiveSlot* live = nullptr;         ///< newer versions of the bundle come here; may be null
   bool apart = false;               ///< our loop searches on a thread of its own (PoseLoopOptions)
-  bool extended = false;            ///< ours goes on from the surroundings (PoseLoopOptions)
+  bool extended = false;            ///< ours continues from the surroundings (PoseLoopOptions)
   std::vector<glm::dvec3> turns;    ///< of a gyroscope, by frame; see read_gyroscope()
+  bool stills = false;              ///< SourceInfo::stills: a new scene is searched anew
 };
 
 /// The method that is meant: the named one; "paper" where parameters of it are named or no pattern

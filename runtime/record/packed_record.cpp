@@ -251,7 +251,7 @@ Result<std::vector<TrackerPatchRecord>> read_patches(const PackedHeader& header,
     }
     for (std::uint32_t i = 0; i < count; ++i) {
       const std::uint64_t cell = bits.read(grid.cells());
-      if (cell >= grid.cells()) return broken("a patch lies outside of the picture");
+      if (cell >= grid.cells()) return broken("a patch is outside the picture");
       const auto columns = static_cast<std::uint64_t>(grid.columns);
       const int x = kPatchBorder + kPatchStep * static_cast<int>(cell % columns);
       const int y = kPatchBorder + kPatchStep * static_cast<int>(cell / columns);

@@ -19,25 +19,21 @@ namespace {
 
 using std::numbers::pi;
 
-// Natural logarithms of the smallest and largest scale of the trial views, 0.3 and the root of 2:
-// areas from 0.1. Of larger ones, to 4, a frame's coarser levels show what smaller views do, and
-// views up to 2 took two fifths of the trials' time.
+// Logarithm of the smallest scale of the trial views. Smaller favours distant patterns.
 constexpr double kLogSmallest = -1.2039728043259361;
+// Logarithm of the largest scale of the trial views. Larger takes time; coarser levels of frames
+// show the same.
 constexpr double kLogLargest = 0.34657359027997265;
 // Degrees of the steepest trial view: a tilt of 4.4, just beyond the steepest baked one of 4.1.
 constexpr double kSteepest = 77.0;
-// View pixels between a trial's feature and the candidate that it repeats. Detection scatters by a
-// pixel or two; a wider radius lets neighbouring corners vouch for each other. Swept on area
-// 0.02-0.05: 53.3, 56.7 and 56.7 % right with 2, 3 and 6.
+// View pixels between a trial's feature and the candidate that it repeats. Wider confirms
+// neighbouring corners, narrower loses scattered ones. [2, 6] tuned: pose
 constexpr int kNear = 3;
-// Bits of 256 within which a candidate repeats a trial's feature. Random codes differ by 128 +- 8,
-// so that 64 lets no chance match through. Swept with 48, 64 and 80: 86.7 and 89.2 % right on 70 %
-// covered (with the first two), 55.8, 56.7 and 52.5 % on area 0.02-0.05; 63.3, 57.5 and 52.5 % on
-// tilt 75-80. Fewer trade covered patterns for tilted ones.
+// Bits within which a candidate repeats a trial's feature. Fewer trade covered patterns for tilted
+// ones. [48, 80] tuned: pose
 constexpr int kRepeats = 64;
-// Matches of a view at which one more counts half: what pulls the choice towards hard views. The
-// pose needs about 8 and half a dozen spare; higher values favour easy views. Swept with 12, 24 and
-// 48: 52.5, 57.5 and 51.7 % right on tilt 75-80, 55.0, 56.7 and 55.8 % on area 0.02-0.05.
+// Matches of a view at which one more counts half. Higher favours easy views, lower hard ones. [12,
+// 48] tuned: pose
 constexpr double kEnough = 24.0;
 
 /// A trial's feature that a candidate repeats, and how well (0 to 1].
@@ -56,7 +52,7 @@ bool within(const GrayImage& pattern, const std::array<double, 2>& p) {
   return p[0] >= -0.5 && p[1] >= -0.5 && p[0] < pattern.width - 0.5 && p[1] < pattern.height - 0.5;
 }
 
-/// Whether what lies so far around a place is of one side of a box: beyond its edge cameras see
+/// Whether the neighbourhood of a place is on one side of a box: beyond its edge cameras see
 /// something else than the picture. True of all other shapes.
 bool on_one_face(const PatternSurface& surface, double x, double y, double reach) {
   if (surface.faces().empty()) return true;
@@ -167,7 +163,7 @@ class Grid {
 
  private:
   static constexpr int kSquare = 4;  // pixels: about the radius of a query
-  /// Positions beside the index, since most candidates of a square are too far away.
+  /// Positions next to the index, since most candidates of a square are too far away.
   struct Entry {
     float x;
     float y;
@@ -343,9 +339,8 @@ std::vector<std::uint32_t> choose(const Trials& trials, std::uint32_t count, dou
   return chosen;
 }
 
-// Gray values a pixel of rms gradient that a patch needs in every direction: the tracker assumes a
-// noise of about 3. A lower limit lets flat patches in, which slide. Swept on area 0.02-0.05: flat
-// from 1.5 to 6.
+// Rms gradient, grey values per pixel, that a patch needs in every direction. Lower accepts flat
+// patches, which slide. [1.5, 6] tuned: pose
 constexpr double kWeakestPatch = 3.0;
 
 struct PatchPlace {

@@ -10,8 +10,7 @@
 namespace modar {
 namespace {
 
-// Samples along a side of a footprint, at most, which bounds a pixel at 36. Views tilted up to 3
-// times get a sample for each level pixel, the steepest baked ones (4.1) one for each 1.4.
+// Samples along a side of a footprint at most. More are exact for steeper views and slower.
 constexpr int kMostSamples = 6;
 
 // Positions in a level are fixed-point numbers with 16 fractional bits, so that every machine
@@ -106,13 +105,13 @@ class Sampler {
   // Pixels classified together: one AVX-512 vector of 32-bit lanes.
   static constexpr std::size_t kRun = 16;
 
-  /// All samples of a pixel lie in the picture.
+  /// All samples of a pixel are in the picture.
   [[nodiscard]] bool inside(std::int32_t x, std::int32_t y) const {
     return x >= footprint_.reach_x && y >= footprint_.reach_y &&
            x < ((level_.width - 1) << 16) - footprint_.reach_x &&
            y < ((level_.height - 1) << 16) - footprint_.reach_y;
   }
-  /// All samples of the pixels from `from` to `to` lie on the same side of the picture.
+  /// All samples of the pixels from `from` to `to` are on the same side of the picture.
   static bool beside(std::int32_t from, std::int32_t to, std::int32_t reach, std::int32_t end) {
     return std::max(from, to) + reach < -0x8000 || std::min(from, to) - reach > end;
   }
@@ -369,7 +368,7 @@ std::vector<Tile> tiles_of(const PatternSurface& surface, const ViewAxes& axes, 
   return tiles;
 }
 
-/// The pixels of the view whose places lie in the tile, row by row, from one level.
+/// The pixels of the view whose places are in the tile, row by row, from one level.
 void draw_tile(const std::vector<ViewLevel>& levels, const Tile& tile, double offset_u,
                double offset_v, double scale, CurvedView& view) {
   const auto& a = tile.linear;
@@ -408,7 +407,7 @@ void draw_tile(const std::vector<ViewLevel>& levels, const Tile& tile, double of
       const std::size_t at =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(view.picture.width) +
           static_cast<std::size_t>(x);
-      // What lies in a parallelogram is one run of a row.
+      // The inside of a parallelogram is one run of a row.
       if (xs.empty()) first = at;
       xs.push_back(fixed((px + 0.5) / factor - 0.5));
       ys.push_back(fixed((py + 0.5) / factor - 0.5));

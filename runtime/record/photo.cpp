@@ -1,5 +1,5 @@
 // The corners of a flat thing in a photo, and the way from there to a picture, as the page has them
-// (runtime/web/own-picture.js).
+// (runtime/extensions/web/own-picture.js).
 #include "modar/photo.hpp"
 
 #include <algorithm>
@@ -13,9 +13,9 @@ namespace modar {
 namespace {
 
 /// Longer side of the copy in which corners are looked for: a pixel of it is some five of the
-/// photo, which people mend.
+/// photo, which people correct.
 constexpr int kLookSide = 192;
-/// Sum of the differences in red, green and blue from which a pixel is none of the table's.
+/// Sum of the differences in red, green and blue from which a pixel is not part of the table.
 constexpr int kOffTable = 48;
 constexpr double kLeastThing = 0.05;  ///< share of the photo
 /// A thing of another shape fills its corners' quadrangle less, or more, by this share.
@@ -29,7 +29,7 @@ struct PhotoCells {
   std::vector<std::uint8_t> cells;
 };
 
-/// What is in a cell: nothing of the table yet, something else; then the table, and things that
+/// Contents of a cell: nothing of the table yet, something else; then the table, and things that
 /// were looked at.
 enum PhotoCell : std::uint8_t { kLikeTable, kThing, kTable, kSeen };
 
@@ -54,7 +54,7 @@ SmallPhoto small_copy(const Photo& photo) {
       const int right = std::max(left + 1, (x + 1) * photo.width / small.width);
       std::array<int, 3> sum{};
       for (int row = top; row < bottom; ++row) {
-        const std::uint8_t* pixel = photo.rgba + 4 * (std::ptrdiff_t{row} * photo.width + left);
+        const std::uint8_t* pixel = photo.rgba + row * photo.stride + 4 * std::ptrdiff_t{left};
         for (int column = left; column < right; ++column, pixel += 4) {
           for (std::size_t c = 0; c < 3; ++c) sum[c] += pixel[c];
         }
@@ -131,7 +131,7 @@ std::vector<int> largest_thing(PhotoCells cells) {
   return best;
 }
 
-/// Those of a part that lie beside something else, as points.
+/// The border pixels of a part, as points.
 std::vector<glm::dvec2> rim_of(const std::vector<int>& part, const PhotoCells& cells) {
   std::vector<bool> inside(cells.cells.size());
   for (const int at : part) inside[static_cast<std::size_t>(at)] = true;
@@ -245,7 +245,7 @@ double luma_at(const Photo& photo, const glm::dvec2& place) {
   const double across = std::clamp(at.x - x, 0.0, 1.0);
   const double down = std::clamp(at.y - y, 0.0, 1.0);
   const auto luma = [&](int column, int row) {
-    const std::uint8_t* rgb = photo.rgba + 4 * (std::ptrdiff_t{row} * photo.width + column);
+    const std::uint8_t* rgb = photo.rgba + row * photo.stride + 4 * std::ptrdiff_t{column};
     return 0.299 * rgb[0] + 0.587 * rgb[1] + 0.114 * rgb[2];
   };
   return (luma(x, y) * (1 - across) + luma(x + 1, y) * across) * (1 - down) +

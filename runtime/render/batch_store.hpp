@@ -1,6 +1,6 @@
 // Copies of small meshes side by side in one buffer, each vertex with the number of its slot: one
 // draw call draws many items on contexts without instancing (ModAR 4.2: uniform matrix array and
-// index stream). What was made stays until its place is needed.
+// index stream). Batches stay until their place is needed.
 #pragma once
 
 #include <cstdint>
@@ -21,13 +21,13 @@ struct MeshRange {
   bool operator==(const MeshRange&) const = default;
 };
 
-/// So many copies of a mesh.
+/// A number of copies of a mesh.
 struct BatchPart {
   MeshRange mesh;
   std::uint32_t copies = 0;
 };
 
-/// Where a part lies in a batch's buffers.
+/// The place of a part in a batch's buffers.
 struct BatchPlace {
   std::uint32_t first_slot = 0;
   std::uint32_t copies = 0;
@@ -61,7 +61,7 @@ class BatchStore {
   /// From now on find() answers nullptr.
   void make_none() { budget_ = 0; }
 
-  /// A batch that holds at least the asked copies of each part, made if there is none. The parts
+  /// A batch that holds at least the asked copies of each part, made if none exists. The parts
   /// together have at most kBatchVertices vertices and `slots` copies. The answer lives until the
   /// next call; nullptr where the budget has no room for it.
   const Batch* find(std::uint32_t layout, std::span<const BatchPart> parts, std::uint32_t slots,

@@ -16,8 +16,7 @@
 namespace modar {
 namespace {
 
-/// Slack for rounding, relative to the size of what is compared: about 80 roundings of a float
-/// (2^-23 each). Larger would only draw what lies that close outside.
+/// Relative slack for some 80 float roundings. Larger draws chunks just outside the picture.
 constexpr float kRoundingSlack = 1e-5f;
 /// Squares of lengths and products of sides that differ by less, relative to a length's square,
 /// turn a normal by less than a thousandth of a radian.
@@ -81,8 +80,8 @@ bool outside_frustum(const ModelView& view, const ChunkRecord& chunk) {
 }
 
 bool faces_away(const ModelView& view, const ChunkRecord& chunk) {
-  // For cutoffs in [0, 1], the directions that see only backs are a convex cone: a box whose eight
-  // corners lie in it lies in it as a whole.
+  // For cutoffs in [0, 1], the directions that see only backs are a convex cone: a box with all
+  // eight corners in it is inside as a whole.
   if (!view.perspective || !(chunk.cone_cutoff >= 0.0f) || chunk.cone_cutoff > 1.0f) return false;
   const glm::vec3 axis(chunk.cone_axis[0], chunk.cone_axis[1], chunk.cone_axis[2]);
   for (unsigned i = 0; i < 8; ++i) {
@@ -117,21 +116,21 @@ std::uint32_t choose_level(const ModelView& view, const ChunkRecord& chunk,
   return level;
 }
 
-std::uint32_t choose_stand_in(const BundleView& bundle, const ModelView& view, std::uint32_t model,
-                              float pixels) {
+std::uint32_t choose_proxy(const BundleView& bundle, const ModelView& view, std::uint32_t model,
+                           float pixels) {
   const std::uint32_t models = bundle.models().size();
-  // From the coarsest of the model on; stand-ins are in the order of models.
+  // From the coarsest of the model on; proxies are in the order of models.
   std::uint32_t low = 0;
-  std::uint32_t end = bundle.stand_ins().size();
+  std::uint32_t end = bundle.proxies().size();
   while (low < end) {
     const std::uint32_t middle = low + (end - low) / 2;
-    if (bundle.stand_ins()[middle].model <= model) {
+    if (bundle.proxies()[middle].model <= model) {
       low = middle + 1;
     } else {
       end = middle;
     }
   }
-  for (; end > 0 && bundle.stand_ins()[end - 1].model == model; --end) {
+  for (; end > 0 && bundle.proxies()[end - 1].model == model; --end) {
     const ChunkGroup group = bundle.chunk_group(models + end - 1);
     float distance = view.perspective ? std::numeric_limits<float>::infinity() : 1.0f;
     for (std::uint32_t c = 0; view.perspective && c < group.chunk_count; ++c) {
@@ -161,16 +160,15 @@ void DrawList::build(const BundleView& bundle, std::span<const ChunkSetup> setup
   }
 }
 
-/// All chunks of the model, or of a stand-in: never some of both, whose borders do not meet.
+/// All chunks of the model, or of a proxy: never some of both, whose borders do not meet.
 void DrawList::add_item(const Request& request, std::uint32_t item) {
   const std::uint32_t model = request.items[item].model;
   const std::size_t first = commands_.size();
   int culled = add_group(request, item, model);
-  const std::uint32_t stand_in =
-      choose_stand_in(request.bundle, views_[item], model, request.lod_pixels);
-  if (stand_in != kNone) {
+  const std::uint32_t proxy = choose_proxy(request.bundle, views_[item], model, request.lod_pixels);
+  if (proxy != kNone) {
     const std::size_t second = commands_.size();
-    const int other = add_group(request, item, stand_in);
+    const int other = add_group(request, item, proxy);
     const bool less =
         cost(request.bundle, second, commands_.size()) <= cost(request.bundle, first, second);
     const auto at = [this](std::size_t i) {
@@ -209,14 +207,14 @@ void DrawList::add_there(const Request& request, std::uint32_t item,
   for (std::uint32_t s = 0; !use_there(bundle, first, geometry); ++s) {
     commands_.resize(first);
     culled = 0;
-    while (s < bundle.stand_ins().size() && bundle.stand_ins()[s].model != model) ++s;
-    if (s >= bundle.stand_ins().size()) break;
+    while (s < bundle.proxies().size() && bundle.proxies()[s].model != model) ++s;
+    if (s >= bundle.proxies().size()) break;
     culled = add_group(request, item, bundle.models().size() + s);
   }
   culled_ += culled;
 }
 
-/// Brings the commands from `first` on to levels that are there, finer ones where one is: an eye
+/// Moves the commands from `first` on to levels that are there, finer ones where one is: an eye
 /// that moves away sees no worse meanwhile. False if a chunk has none.
 bool DrawList::use_there(const BundleView& bundle, std::size_t first,
                          const GeometryStore& geometry) {
@@ -235,7 +233,7 @@ bool DrawList::use_there(const BundleView& bundle, std::size_t first,
   return true;
 }
 
-/// Adds what is seen of a group's chunks; answers how many are not.
+/// Adds the visible chunks of a group; answers how many are not.
 int DrawList::add_group(const Request& request, std::uint32_t item, std::uint32_t number) {
   const BundleView& bundle = request.bundle;
   const ChunkGroup group = bundle.chunk_group(number);
@@ -340,8 +338,7 @@ glm::mat4 scene_matrix(const SceneRecord& scene) {
 }
 
 DepthRange depth_range(const BundleView& bundle, std::span<const DrawItem> items) {
-  // Far over near. A 16-bit depth buffer then still tells depths apart that differ by 1.5 % at the
-  // far end (far / near / 2^16); set by that bound.
+  // Far over near. A 16-bit depth buffer still resolves distances of 1.5 % at the far end.
   constexpr double kGreatestRatio = 1000.0;
   constexpr double kMargin =
       0.01;  // keeps what touches a plane inside it, though half floats move it by 0.0002

@@ -1,5 +1,5 @@
 // What a view shows of a bundle: which chunks of which items are drawn, at which level, in which
-// order. Culling is conservative: what is seen in the least part is never culled. Internal to
+// order. Culling is conservative: a chunk with any visible part is never culled. Internal to
 // runtime/render.
 #pragma once
 
@@ -50,10 +50,10 @@ float eye_distance(const ModelView& view, const ChunkRecord& chunk);
 std::uint32_t choose_level(const ModelView& view, const ChunkRecord& chunk,
                            const Table<LevelRecord>& levels, float pixels);
 
-/// The coarsest stand-in of a model whose error is at most `pixels` on the screen, as a chunk group
-/// of the bundle; kNone: there is none.
-std::uint32_t choose_stand_in(const BundleView& bundle, const ModelView& view, std::uint32_t model,
-                              float pixels);
+/// The coarsest proxy of a model whose error is at most `pixels` on the screen, as a chunk group
+/// of the bundle; kNone: none exists.
+std::uint32_t choose_proxy(const BundleView& bundle, const ModelView& view, std::uint32_t model,
+                           float pixels);
 
 struct DrawCommand {
   std::uint32_t item = 0;
@@ -77,13 +77,13 @@ struct ChunkSetup {
 
 class DrawList {
  public:
-  /// Collects what is visible: of each item its model's chunks, or a stand-in where that is less to
+  /// Collects visible chunks: of each item its model's chunks, or a proxy where that is less to
   /// draw. setups: one a chunk of the bundle. Keeps its memory from call to call.
   void build(const BundleView& bundle, std::span<const ChunkSetup> setups,
              const glm::mat4& projection, int height, std::span<const DrawItem> items,
              float lod_pixels);
   /// The same of levels that are there: of each item all chunks that are seen, at their level or a
-  /// coarser one, else the finest stand-in, else nothing.
+  /// coarser one, else the finest proxy, else nothing.
   void build_of(const GeometryStore& geometry, const BundleView& bundle,
                 std::span<const ChunkSetup> setups, const glm::mat4& projection, int height,
                 std::span<const DrawItem> items, float lod_pixels);

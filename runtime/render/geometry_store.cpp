@@ -13,11 +13,10 @@
 namespace modar {
 namespace {
 
-/// Vertices that are widened at a time: more would cost memory (16 KB at 4 bytes each way per
-/// attribute), fewer more calls of glBufferSubData (16 for the largest chunk).
+/// Vertices widened at a time. More take memory, fewer need more calls of glBufferSubData.
 constexpr std::size_t kScratchVertices = 4096;
 
-/// What is wrong where vertices cannot be put as they are.
+/// The fault if vertices cannot be uploaded unchanged.
 Result<void> rewritten() {
   return fail(ExitCode::kUnsupported, "gl.halves", "vertices",
               "this context reads no half floats, and vertices are rewritten for it",
@@ -64,7 +63,7 @@ void GeometryStore::collect_ranges() {
         vertices.layout = bundle_.models()[group.model].layout;
         const bool coarsest = i + 1 == chunk.level_count;
         vertices.rank = index_ranges_[chunk.first_level + i].rank = g >= bundle_.models().size()
-                                                                        ? kStandIn
+                                                                        ? kProxy
                                                                     : coarsest ? kCoarsest
                                                                                : 0;
       }
@@ -187,7 +186,7 @@ Result<void> GeometryStore::expect_wanted() {
   return {};
 }
 
-/// Ranges that lie in one of shown_geometry().
+/// Ranges inside one of shown_geometry().
 void GeometryStore::find_kept(bool indices) {
   const std::vector<StageRange> shown = shown_geometry(bundle_, indices);
   for (Range& range : indices ? index_ranges_ : vertex_ranges_) {
@@ -381,7 +380,7 @@ bool GeometryStore::make_resident(Range& range, GlState& gl) {
 }
 
 /// Deletes the ranges that were used longest ago until `bytes` fit, of each chunk its coarsest
-/// level and stand-ins last: where one chunk of a view is missing, a stand-in is what is seen.
+/// level and proxies last: where one chunk of a view is missing, a proxy is drawn.
 /// Nothing of this frame.
 bool GeometryStore::evict(std::uint64_t bytes, GlState& gl) {
   while (resident_bytes_ + bytes > budget_) {

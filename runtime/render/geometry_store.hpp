@@ -13,7 +13,7 @@
 
 namespace modar {
 
-/// Where a level's vertices and indices lie in GL.
+/// The places of a level's vertices and indices in GL.
 struct LevelPlace {
   GLuint vertex_buffer = 0;
   GLuint index_buffer = 0;
@@ -37,21 +37,22 @@ class GeometryStore {
   Result<void> expect();
   /// In place of upload(), where bytes come when want() asks for them: levels that shown_geometry()
   /// names are in the bundle's bytes, and uploaded when they are used; use() is for those that are
-  /// there(). fits() is for two thirds of the budget, so that what is drawn leaves room for what is
-  /// wanted. Errors: as expect().
+  /// there(). fits() is for two thirds of the budget, so that drawn levels leave room for requested
+  /// ones. Errors: as expect().
   Result<void> expect_wanted();
   /// After expect_wanted(): whether these levels can be used.
   [[nodiscard]] bool there(std::span<const std::uint32_t> levels) const;
-  /// What of these levels is not there is asked for from now on, in their order, and nothing else.
+  /// Missing levels of these are requested from now on, in their order, and nothing else.
   void want(std::span<const std::uint32_t> levels);
   /// Makes room for the next range that is wanted; kNone: nothing is, or this frame uses the whole
-  /// budget. The range's number is for have(), its bytes are told from the start of their section.
+  /// budget. The range's number is for have(), its bytes are counted from the start of their
+  /// section.
   std::uint32_t open_wanted(GlState& gl, bool& indices, std::uint64_t& offset, std::uint64_t& size);
   /// All bytes of an open range were put().
   void have(std::uint32_t range);
 
   /// Bytes of the section of indices or vertices from `offset` on, once expect() has made room;
-  /// after expect_wanted(), what of them lies in open ranges.
+  /// after expect_wanted(), the part of them in open ranges.
   void put(bool indices, std::uint64_t offset, std::span<const std::byte> bytes);
   /// In place of upload(), where not all bytes are there: levels are uploaded when they are used.
   void upload_when_used();
@@ -62,17 +63,17 @@ class GeometryStore {
   void set_client_arrays(bool wanted) { client_arrays_ = wanted && !rewrites_ && !streams_; }
   [[nodiscard]] bool client_arrays() const { return client_arrays_; }
 
-  /// Starts a frame: what is used from here on is not evicted before the next one.
+  /// Starts a frame: levels used from here on are not evicted before the next one.
   void begin_frame() { ++frame_; }
-  /// Makes a level resident and answers where; false if the budget holds no room beside what this
-  /// frame uses already. Uploads and evicts where need be.
+  /// Makes a level resident and answers where; false if the budget has no room in addition to the
+  /// levels of this frame. Uploads and evicts where need be.
   bool use(std::uint32_t level, GlState& gl, LevelPlace& place);
 
   /// True if the budget holds all these levels at once.
   [[nodiscard]] bool fits(std::span<const std::uint32_t> levels);
 
   [[nodiscard]] bool streams() const { return streams_; }
-  /// It streams what the bundle's bytes do not hold: others bring it as want() says.
+  /// It streams what the bundle's bytes do not hold: others load it as want() says.
   [[nodiscard]] bool arrives() const { return arrives_; }
   [[nodiscard]] std::uint64_t resident_bytes() const { return resident_bytes_; }
   [[nodiscard]] std::uint64_t total_bytes() const { return vertex_total_ + index_total_; }
@@ -95,9 +96,9 @@ class GeometryStore {
     [[nodiscard]] std::uint64_t age() const { return last_used + rank; }
   };
 
-  /// Ranks, more than all frames: of a chunk's coarsest level, of a stand-in's.
+  /// Ranks, more than all frames: of a chunk's coarsest level, of a proxy's.
   static constexpr std::uint64_t kCoarsest = std::uint64_t{1} << 61;
-  static constexpr std::uint64_t kStandIn = std::uint64_t{1} << 62;
+  static constexpr std::uint64_t kProxy = std::uint64_t{1} << 62;
   /// Later than all frames, so that it is not evicted.
   static constexpr std::uint64_t kOpen = ~std::uint64_t{0};
 

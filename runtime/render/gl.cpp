@@ -216,7 +216,7 @@ constexpr std::array<GLenum, 6> kBlend = {GL_BLEND_EQUATION_RGB, GL_BLEND_EQUATI
                                           GL_BLEND_SRC_RGB,      GL_BLEND_DST_RGB,
                                           GL_BLEND_SRC_ALPHA,    GL_BLEND_DST_ALPHA};
 constexpr std::array<GLenum, 3> kModes = {GL_CULL_FACE_MODE, GL_FRONT_FACE, GL_DEPTH_FUNC};
-/// The last four are of ES 3: length of rows and images, and what is skipped, must be 0 for us.
+/// The last four are of ES 3: length of rows and images, and skipped parts must be 0 for us.
 constexpr std::array<GLenum, 6> kPixelStore = {
     GL_UNPACK_ALIGNMENT, GL_PACK_ALIGNMENT, 0x0CF2, 0x0CF3, 0x0CF4, 0x0D02};
 

@@ -42,7 +42,7 @@ struct GlExtensions {
   }
 };
 
-/// Of ES 3: glCopyBufferSubData(); null where there is none. Apart from GlExtensions, so that
+/// Of ES 3: glCopyBufferSubData(); null if none. Apart from GlExtensions, so that
 /// programs of whole bundles do not link it.
 using CopyBuffer = void(GL_APIENTRYP)(GLenum from, GLenum to, GLintptr from_offset,
                                       GLintptr to_offset, GLsizeiptr size);
@@ -55,7 +55,7 @@ GlExtensions load_gl_extensions(const GlCaps& caps);
 constexpr GLenum kReadFramebuffer = 0x8CA8;
 constexpr GLenum kDrawFramebuffer = 0x8CA9;
 
-/// What GL calls of ours change, as the app had it, brought back when this ends: framebuffers,
+/// GL state that our calls change, restored to the app's when this ends: framebuffers,
 /// viewport, vertex array object, program, buffers, the textures and samplers of units 0 to 2, the
 /// active unit, blending, culling, depth, scissor, stencil test, polygon offset, masks, clear
 /// colour and the pixel store. Of the default vertex array object, the attributes 0 to 7 end

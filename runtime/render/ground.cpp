@@ -30,7 +30,7 @@ glm::mat4 shadow_to_eye(const DrawItem& item, const SceneRecord& scene) {
   return item.world_to_eye * moved;
 }
 
-/// Texels of a page, as far as it is filled. Each shadow has a border of its own outermost texels,
+/// Texels of the filled part of a page. Each shadow has a border of its own outermost texels,
 /// which linear filtering reads.
 struct Page {
   std::uint32_t side = 0;  ///< texels from row to row

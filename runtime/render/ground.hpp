@@ -17,7 +17,7 @@
 
 namespace modar {
 
-/// A corner in clip space, and where its texel lies.
+/// A corner in clip space, and the place of its texel.
 struct ClipVertex {
   glm::vec4 place;
   glm::vec2 uv;
@@ -29,15 +29,15 @@ void draw_clip_vertices(std::span<const ClipVertex> vertices, GLenum mode, GLuin
 
 class Ground {
  public:
-  /// Shadows lie side by side in few textures, so that one call draws those of many models. Errors:
+  /// Shadows are side by side in few textures, so that one call draws those of many models. Errors:
   /// kUnsupported "gl.shader", "gl.program".
   Result<void> create(const BundleView& bundle);
   void release(GlState& gl);
 
-  /// Darkens what is in the framebuffer, for each item of a scene with a shadow.
+  /// Darkens the framebuffer, for each item of a scene with a shadow.
   void draw_shadows(const BundleView& bundle, const glm::mat4& projection,
                     std::span<const DrawItem> items, GlState& gl, RenderStats& stats);
-  /// Fills the depth buffer where the patterns of the items' scenes lie.
+  /// Fills the depth buffer over the patterns of the items' scenes.
   void hide_below(const BundleView& bundle, const glm::mat4& projection,
                   std::span<const DrawItem> items, GlState& gl, RenderStats& stats);
 

@@ -39,8 +39,8 @@ RoomLight neutral_room() {
 
 glm::vec4 mirror_factors(float shininess, float reflectance, float metalness) {
   // The sky's polynomials are weakened to 2/3 and 1/4 of its radiance; a lobe cos^s with s = n / 4
-  // about the mirrored ray weakens them by (s + 1) / (s + 2) and s / (s + 3). Less than 4: what is
-  // so rough mirrors wider lobes towards its normal.
+  // about the mirrored ray weakens them by (s + 1) / (s + 2) and s / (s + 3). Less than 4: surfaces
+  // this rough mirror wider lobes towards their normal.
   const float n = std::max(shininess, 4.0f);
   const float roughness = std::sqrt(std::sqrt(2.0f / (shininess + 2.0f)));
   const float share = reflectance * (1.0f - metalness);

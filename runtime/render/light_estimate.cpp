@@ -14,20 +14,19 @@
 namespace modar {
 namespace {
 
-/// Samples of a cell across and down: their mean has a quarter of one pixel's spread, and 16 of 64
-/// cells take some 30 us on a desk.
+/// Samples of a cell in each direction. More reduce noise and take time.
 constexpr int kSamples = 4;
 /// The share of a new look: the light follows in about a third of a second at 30 frames a second.
 constexpr float kFollow = 0.3f;
-/// After so many frames without a look, the first one counts alone.
+/// After this many frames without a sample, the first one counts alone.
 constexpr std::uint64_t kForget = 60;
 /// Linear. Darker cells tell noise, brighter samples are cut off by the camera.
 constexpr float kDark = 0.02f;
 constexpr float kBright = 0.94f;
-/// Cells whose brightness lies beyond this factor of the middle one's show something else: a hand,
+/// Cells whose brightness is beyond this factor of the middle one's show something else: a hand,
 /// a reflection.
 constexpr float kOdd = 1.8f;
-/// The same for a cell beside the plane of light through all, and how often such cells are looked
+/// The same for a cell off the plane of light through all, and how often such cells are looked
 /// for: what covers cells in part bends the plane at first.
 constexpr float kOff = 1.12f;
 constexpr int kPasses = 3;
@@ -74,7 +73,7 @@ glm::vec3 pixel_of(const CameraPicture& frame, int x, int y) {
       255.0f);
 }
 
-/// A cell of the pattern as it is and as it is seen, linear.
+/// A cell of the pattern as printed and as seen, linear.
 struct Cell {
   glm::vec3 stored{0.0f};
   glm::vec3 seen{0.0f};

@@ -1,5 +1,5 @@
-// The camera's light: what a pattern's colours look like in a frame, beside what they are. Internal
-// to runtime/render.
+// The camera's light: what a pattern's colours look like in a frame, compared with the print.
+// Internal to runtime/render.
 #pragma once
 
 #include <cstdint>
@@ -55,7 +55,7 @@ class LightEstimator {
 
 /// One look, without the past. matrix: pattern plane (x right, y up, z = 0) to clip space of a
 /// viewport that shows the whole frame. colours: a SectionType::kPatternColours section. Not known
-/// where less than a quarter of the pattern is seen, or what is seen is all black or all white.
+/// where less than a quarter of the pattern is seen, or the visible part is all black or all white.
 PlaneLight look_at_pattern(const CameraPicture& frame, const glm::mat4& matrix,
                            const PatternRecord& pattern, std::span<const std::byte> colours);
 

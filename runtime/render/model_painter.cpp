@@ -14,11 +14,10 @@
 namespace modar {
 namespace {
 
-/// Copies that one call can draw, if their matrices find room: 59 do in the 256 vectors that every
-/// ES 3 has. 64 are 4 KB a call.
+/// Copies that one call draws at most; 59 fit into the uniforms that every ES 3 has.
 constexpr int kMostSlots = 64;
 
-/// Of a colour as it is stored (sRGB); above 1 it goes on.
+/// Of a stored colour (sRGB); above 1 it continues.
 float linear(float stored) {
   return stored <= 0.04045f ? stored / 12.92f : std::pow((stored + 0.055f) / 1.055f, 2.4f);
 }
@@ -223,7 +222,7 @@ void ModelPainter::set_surface(const PaintJob& job, ProgramState& state, const P
   job.gl.set_culling((material.flags & kMaterialTwoSided) == 0);
   job.gl.set_front_face(piece.mirrored ? GL_CW : GL_CCW);
   job.gl.set_blending(piece.blended);
-  // What is seen through must not hide what is drawn after it, which is nearer.
+  // Transparent parts must not hide later, nearer ones.
   job.gl.set_depth_writes(!piece.blended);
   job.gl.set_colour_writes((material.flags & kMaterialOccluder) == 0);
 }
@@ -354,7 +353,7 @@ void ModelPainter::draw(const PaintJob& job) {
   }
 }
 
-/// The pictures that a blended piece lies before, by its box's middle.
+/// The pictures behind a blended piece, by its box's middle.
 void ModelPainter::draw_behind(const PaintJob& job, const Piece& piece) {
   const ChunkRecord& chunk = bundle_.chunks()[piece.chunk];
   const glm::vec3 middle =
@@ -415,7 +414,7 @@ void ModelPainter::draw_group(const PaintJob& job, std::span<Piece> group) {
   std::make_heap(group.begin(), group.end(), before);
   std::sort_heap(group.begin(), group.end(), before);
   // Copies of one mesh by instances, where the context has them; the rest side by side in batches,
-  // and what is too large for those alone.
+  // and meshes too large for those alone.
   std::size_t waiting = 0;
   for (std::size_t i = 0; i < group.size();) {
     std::size_t end = i + 1;
@@ -594,8 +593,7 @@ bool ModelPainter::draw_batch(const PaintJob& job, ProgramState& state,
   return true;
 }
 
-/// One call for what lies side by side in the batch: parts_ tells how many copies of each are
-/// asked.
+/// One call for neighbours in the batch: parts_ has the requested copies of each.
 void ModelPainter::draw_runs(const PaintJob& job, const Batch& batch) {
   std::uintptr_t start = 0;
   std::uint32_t count = 0;

@@ -36,7 +36,7 @@ struct PaintJob {
   const TextureStore& textures;
   GlState& gl;
   RenderStats& stats;
-  PlanePainter& planes;  ///< seen through, to draw before the blended chunks that lie before them
+  PlanePainter& planes;  ///< transparent, to draw before the blended chunks in front of them
   const PlanePainter::Job& pictures;
   const LightEstimator* estimator = nullptr;  ///< null: light is as stated
 };

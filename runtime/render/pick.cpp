@@ -1,4 +1,4 @@
-// A ray against the triangles of a bundle: which model lies under a pixel.
+// A ray against the triangles of a bundle: which model is under a pixel.
 #include <cmath>
 #include <limits>
 

@@ -144,7 +144,7 @@ std::uint64_t send_rows(const PlaneLayout& layout, const std::uint8_t* pixels,
     glTexSubImage2D(GL_TEXTURE_2D, 0, 0, first, width, end - first, layout.format, GL_UNSIGNED_BYTE,
                     start);
   } else {
-    // ES 2.0 cannot step over padding: row by row, without a copy of ours.
+    // ES 2.0 cannot step over padding: row by row, without our own copy.
     for (int y = first; y < end; ++y, start += stride) {
       glTexSubImage2D(GL_TEXTURE_2D, 0, 0, y, width, 1, layout.format, GL_UNSIGNED_BYTE, start);
     }
@@ -241,7 +241,7 @@ std::uint64_t Background::upload(const CameraPicture& picture, GlState& gl) {
   return bytes;
 }
 
-/// Luma and RGB are taken as they are where a texel is a pixel; chroma is always interpolated.
+/// Luma and RGB are taken unchanged where a texel is a pixel; chroma is always interpolated.
 void Background::set_filters(bool exact, GlState& gl) {
   const int count = layouts_of(format_).count;
   for (int i = 0; i < count; ++i) {

@@ -15,7 +15,7 @@ namespace modar {
 
 class Target {
  public:
-  /// Makes the framebuffer anew at that size, with so many samples a pixel at most. Errors:
+  /// Makes the framebuffer anew at that size, with this many samples per pixel at most. Errors:
   /// kUnsupported "gl.framebuffer".
   Result<void> resize(int width, int height, int samples, const GlCaps& caps,
                       const GlExtensions& extensions, GlState& gl);
@@ -23,9 +23,9 @@ class Target {
 
   /// Draw calls go here from now on.
   void begin() const { glBindFramebuffer(GL_FRAMEBUFFER, drawn_ != 0 ? drawn_ : framebuffer_); }
-  /// What was drawn is in the texture from now on.
+  /// The drawing is in the texture from now on.
   void finish(const GlExtensions& extensions) const;
-  /// What was finished is read from here.
+  /// The finished drawing is read from here.
   void bind() const { glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_); }
   [[nodiscard]] GLuint texture() const { return texture_; }
   [[nodiscard]] int width() const { return width_; }

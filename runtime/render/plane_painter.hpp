@@ -1,4 +1,4 @@
-// Pictures that stand on patterns: rectangles that show a texture, unlit. Internal to
+// Pictures on patterns: rectangles that show a texture, unlit. Internal to
 // runtime/render.
 #pragma once
 

@@ -46,7 +46,7 @@ struct ModelProgram {
   GLint opacity = -1;
 };
 
-/// Vertex uniform vectors that a model program needs beside its slots.
+/// Vertex uniform vectors that a model program needs in addition to its slots.
 inline constexpr int kFixedUniformVectors = 4 + 7 + 2 + 5;
 
 /// Links sources under "#version 100" and `defines` (each a line). Attribute locations are those of
@@ -61,8 +61,7 @@ const char* shadow_vertex_source();
 const char* shadow_fragment_source();
 const char* plane_fragment_source();
 
-/// The models' shaders: shaders/model.vert and model.frag, unless a bench has put others in their
-/// place, which programs that are made from then on have.
+/// Shader sources for models. A bench may replace them; affects programs compiled afterwards.
 struct ModelSources {
   const char* vertex = nullptr;
   const char* fragment = nullptr;

@@ -1,4 +1,4 @@
-// The renderer: what is set up once, and the frame.
+// The renderer: set-up, and the frame.
 #include "modar/renderer.hpp"
 
 #include <algorithm>
@@ -25,30 +25,23 @@
 namespace modar {
 namespace {
 
-/// How often four times the error is allowed on the screen where time or memory is short. Errors
-/// count shading, which shows long before the form does: of a scan of a building, 50 m wide, a
-/// stand-in of 57,031 triangles states 250 m, where no stand-in is off by 2.6 m. 65,536 times is
-/// more than any states.
+/// Steps by which the allowed error on the screen is multiplied by four when time or memory is
+/// short. The last exceeds any stated error.
 constexpr int kCoarser = 8;
-/// The same where what is drawn is brought at first: beyond it, what a view brings on its way is
-/// more than all that it needs (tests/web/wanted_test.py, behind a slow host).
+/// The same for the first view that is downloaded. Beyond it, coarse levels on the way take more
+/// bytes than the view needs.
 constexpr int kCoarserBrought = 5;
-/// Halvings of such a step in search of what fits: 6 leave 2 % of error. Two stand-ins of a scan of
-/// 15.8 million triangles, of 61,522 and 15,380, state 7 % more or less.
+/// Halvings of such a step in search of the best fit. Six leave 2 % of error.
 constexpr int kFiner = 6;
-/// The same of what is wanted next: 9 %.
+/// The same for the next request: 9 %.
 constexpr int kFinerNext = 4;
-/// How much wider and higher than the picture what is asked for before it is seen is: trades bytes
-/// that may never be seen for turns that find nothing missing. `tests/bench/huge_page.py --pan
-/// --max-bytes 16e6` over a scan of 4.5 million triangles falls to a stand-in 3 times with 1, never
-/// with 1.5.
+/// Margin of the requested view, relative to the picture. Larger requests bytes that may never be
+/// seen, smaller leaves gaps on turns. [1, 1.5]
 constexpr float kAround = 1.5f;
-/// Triangles of a frame, a draw call counted as some (see DrawList::cost()). Trades detail near the
-/// eye for the frame rate; the largest scans of one object, of 0.9 million, are still drawn whole.
-/// No phone with ES 3 was there to measure it on. Set by hand.
+/// Triangles of a frame, each draw call counted as several (see DrawList::cost()). Higher is finer
+/// near the eye and slower. Not measured on phones.
 constexpr std::uint64_t kMostTriangles = 1'000'000;
-/// The same of GPUs without ES 3, which are from before 2013: 100,000 triangles in 20 draw calls
-/// take a Mali-400 10 ms.
+/// The same for GPUs without ES 3, from before 2013.
 constexpr std::uint64_t kFewTriangles = 104'000;
 
 std::uint64_t all_texture_bytes(const BundleView& bundle, const GlCaps& caps) {
@@ -119,7 +112,7 @@ SurfaceMap map_frame(const SurfaceView& surface, int frame_width, int frame_heig
   const float cosine = static_cast<float>(kCosine[quarter]);
   const float sine = static_cast<float>(kSine[quarter]);
   if (surface.mirror) stretch.x = -stretch.x;
-  // Clockwise: what was on top comes to the right.
+  // Clockwise: the top comes to the right.
   map.turn = {glm::vec2(cosine, -sine) * stretch, glm::vec2(sine, cosine) * stretch};
   return map;
 }
@@ -185,11 +178,11 @@ struct Renderer::State {
     MODAR_TRY(textures.expect(0));
     MODAR_TRY(geometry.expect());
     // Batches are copied from the bundle's bytes.
-    if (!bundle.stand_ins().empty()) painter.make_no_batches();
+    if (!bundle.proxies().empty()) painter.make_no_batches();
     return finish_upload();
   }
 
-  /// In place of upload(): what is put() when it is wanted.
+  /// In place of upload(): uploads by put() on request.
   Result<void> expect_wanted() {
     if (!caps.es3) {
       return fail(ExitCode::kUnsupported, "gl.levels", "textures",
@@ -257,7 +250,7 @@ struct Renderer::State {
   /// What differs more takes the place of what a frame has no time or memory for.
   void build_list(const glm::mat4& projection, int height, std::span<const DrawItem> items) {
     const bool coarser =
-        bundle.levels().size() > bundle.chunks().size() || !bundle.stand_ins().empty();
+        bundle.levels().size() > bundle.chunks().size() || !bundle.proxies().empty();
     float pixels = options.lod_pixels;
     const auto fits = [&](float some) {
       list.build(bundle, painter.setups(), projection, height, items, some);
@@ -269,7 +262,7 @@ struct Renderer::State {
       pixels = step < most || !geometry.streams() ? 4.0f * pixels : options.lod_pixels;
     }
     if (step > 0 && step <= most) {
-      // The finest of that step which fits: stand-ins of one model often lie in one.
+      // The finest of that step which fits: proxies of one model often are in one.
       float factor = 2.0f;
       for (int i = 0; i < kFiner; ++i, factor = std::sqrt(factor)) {
         if (fits(pixels / factor)) pixels /= factor;
@@ -280,7 +273,7 @@ struct Renderer::State {
       (this->*draw_what_is_there)(projection, height, items, pixels);
   }
 
-  /// The list has what is to be drawn where all is there. What differs most is asked for first, so
+  /// The list has the final drawing, with all data. The largest difference is requested first, so
   /// that a view gets better step by step.
   void use_what_is_there(const glm::mat4& projection, int height, std::span<const DrawItem> items,
                          float pixels) {
@@ -304,7 +297,7 @@ struct Renderer::State {
       if (lacks(fine)) break;
       coarse = fine;
     }
-    // The coarsest of that step: stand-ins of one model often lie in one.
+    // The coarsest of that step: proxies of one model often are in one.
     for (int i = 0; coarse > 0.0f && i < kFinerNext; ++i) {
       const float middle = std::sqrt(coarse * fine);
       (lacks(middle) ? fine : coarse) = middle;
@@ -314,8 +307,8 @@ struct Renderer::State {
     list.build_of(geometry, bundle, painter.setups(), projection, height, items, pixels);
   }
 
-  /// Asks for what is listed, then for the coarsest of chunks around it that have no level yet:
-  /// where one that comes into view is missing, the whole model is drawn by a stand-in.
+  /// Requests the listed levels, then the coarsest of chunks around it that have no level yet:
+  /// where one that comes into view is missing, the whole model is drawn by a proxy.
   void want_around(const glm::mat4& projection, int height, std::span<const DrawItem> items) {
     glm::mat4 wide = projection;
     for (int column = 0; column < 4; ++column) {
@@ -327,7 +320,7 @@ struct Renderer::State {
       const auto is_own = [&](const DrawCommand& command) {
         return command.item == i && command.chunk < bundle.chunks().own().size();
       };
-      // A stand-in is there as a whole.
+      // A proxy is there as a whole.
       if (std::none_of(list.commands().begin(), list.commands().end(), is_own)) continue;
       const ModelView view = model_view(wide, items[i].to_eye, height);
       const ModelRecord& model = bundle.models()[items[i].model];
@@ -356,7 +349,7 @@ struct Renderer::State {
   bool list_fits() {
     const std::uint64_t most = caps.es3 ? kMostTriangles : kFewTriangles;
     if (list.cost(bundle, 0, list.commands().size()) > most) return false;
-    if (!geometry.streams() || bundle.stand_ins().empty()) return true;
+    if (!geometry.streams() || bundle.proxies().empty()) return true;
     list_levels();
     return geometry.fits(levels);
   }
@@ -420,10 +413,10 @@ Result<std::unique_ptr<Renderer>> Renderer::create_part(const BundleView& bundle
   return renderer;
 }
 
-Renderer::Wanted Renderer::open_wanted() {
+Renderer::StreamRequest Renderer::open_wanted() {
   State& s = *state_;
   const SavedGlState saved(s.extensions, !s.options.exclusive_context);
-  Wanted wanted;
+  StreamRequest wanted;
   std::span<const std::byte> section;
   wanted.number = s.textures.want(wanted.offset, wanted.size);
   if (wanted.number != kNone) {
@@ -494,7 +487,7 @@ Result<void> Renderer::restore(const GlCaps& caps) {
   // The old state is dropped without a GL call: its names mean nothing in this context.
   auto state = std::make_unique<State>(state_->bundle, caps);
   state->options = state_->options;
-  state->estimator = std::move(state_->estimator);  // the room's light stays as it was
+  state->estimator = std::move(state_->estimator);  // the room's light stays unchanged
   const int width = state_->target.width();
   const int height = state_->target.height();
   state_ = std::move(state);
@@ -617,7 +610,7 @@ void Renderer::set_video(std::uint32_t node, std::uint32_t texture) {
 }
 
 void Renderer::set_options(const RenderOptions& options) {
-  // The state that later frames build on: what was uploaded before left the app's behind.
+  // The state that later frames build on: earlier uploads replaced the app's.
   if (options.exclusive_context && !state_->options.exclusive_context) state_->gl.reset();
   state_->options = options;
 }

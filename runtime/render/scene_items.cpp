@@ -1,4 +1,4 @@
-// What of a pattern's scenes and nodes is shown, as items; and where its labels lie.
+// What of a pattern's scenes and nodes is shown, as items; and the places of its labels.
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 

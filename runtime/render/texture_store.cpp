@@ -17,10 +17,8 @@ bool power_of_two(const TextureRecord& texture) {
   return is_power_of_two(texture.width) && is_power_of_two(texture.height);
 }
 
-/// Side of the level whose texels are averaged. Their mean as stored is nearer to what most of a
-/// surface has than that in linear light, which a few white marks on black plastic rule: of 1, 4, 8
-/// and 32, the colour of four controllers (npm: @webxr-input-profiles/assets) is off by 4.2, 3.9,
-/// 3.7 and 3.4 in the mean of their worst views (`modar check --source FILE --visual FOLDER`).
+/// Side of the mip level whose texels are averaged. Smaller lets few bright texels dominate, larger
+/// ignores small parts. [1, 32]
 constexpr std::uint32_t kMeanSide = 32;
 
 /// Middle gray where the texture has no level so small.
@@ -143,7 +141,7 @@ GLuint TextureStore::begin(const TextureRecord& record) {
   GLuint id = 0;
   glGenTextures(1, &id);
   glBindTexture(GL_TEXTURE_2D, id);
-  // ES 2.0 repeats power-of-two textures only, and shows others black where it is asked to.
+  // ES 2.0 repeats power-of-two textures only, and shows others black if they should repeat.
   const bool repeat =
       (record.flags & kTextureRepeat) != 0 && (npot_mipmaps_ || power_of_two(record));
   const GLint wrap = repeat ? GL_REPEAT : GL_CLAMP_TO_EDGE;
@@ -275,23 +273,23 @@ void TextureStore::take(std::uint32_t texture, GLuint name, std::uint32_t level,
                         std::span<const std::byte> bytes) {
   const TextureRecord& record = bundle_.textures()[texture];
   const std::uint64_t size = bundle_.texture_levels()[record.first_level + level].size;
-  auto coming = std::find_if(coming_.begin(), coming_.end(), [&](const Coming& each) {
+  auto pending = std::find_if(pending_.begin(), pending_.end(), [&](const PendingUpload& each) {
     return each.name == name && each.level == level;
   });
   std::span<const std::byte> blocks = bytes;
   if (bytes.size() < size) {
-    if (coming == coming_.end()) {
-      coming = coming_.insert(coming_.end(), Coming{name, level, 0, {}});
-      coming->bytes.resize(static_cast<std::size_t>(size));
+    if (pending == pending_.end()) {
+      pending = pending_.insert(pending_.end(), PendingUpload{name, level, 0, {}});
+      pending->bytes.resize(static_cast<std::size_t>(size));
     }
-    std::copy(bytes.begin(), bytes.end(), coming->bytes.begin() + static_cast<std::ptrdiff_t>(at));
-    coming->came += bytes.size();
-    if (coming->came < size) return;
-    blocks = coming->bytes;
+    std::copy(bytes.begin(), bytes.end(), pending->bytes.begin() + static_cast<std::ptrdiff_t>(at));
+    pending->came += bytes.size();
+    if (pending->came < size) return;
+    blocks = pending->bytes;
   }
   glBindTexture(GL_TEXTURE_2D, name);
   send(texture, level, blocks);
-  if (coming != coming_.end()) coming_.erase(coming);
+  if (pending != pending_.end()) pending_.erase(pending);
   decoded_ = {};
 }
 

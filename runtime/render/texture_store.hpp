@@ -38,7 +38,7 @@ class TextureStore {
   void put(std::uint32_t texture, std::uint64_t offset, std::span<const std::byte> bytes);
   void release(GlState& gl);
 
-  /// 0 where there is none.
+  /// 0 if none.
   [[nodiscard]] GLuint colour(std::uint32_t texture) const { return colours_[texture]; }
   [[nodiscard]] GLuint alpha(std::uint32_t texture) const { return alphas_[texture]; }
   /// The texture's mean colour, which is its coarsest level.
@@ -64,7 +64,7 @@ class TextureStore {
   void send(std::uint32_t texture, std::uint32_t level, std::span<const std::byte> blocks);
 
   /// A level of which some bytes have come.
-  struct Coming {
+  struct PendingUpload {
     GLuint name = 0;
     std::uint32_t level = 0;
     std::uint64_t came = 0;
@@ -85,7 +85,7 @@ class TextureStore {
   std::vector<GLuint> alphas_;
   std::vector<Rgb8> means_;
   std::vector<std::uint8_t> decoded_;
-  std::vector<Coming> coming_;
+  std::vector<PendingUpload> pending_;
   std::vector<std::uint32_t> shown_;  ///< after expect_wanted(): the finest level that is there
   std::uint32_t wanted_ = kNone;      ///< texture
   std::uint64_t bytes_ = 0;

@@ -16,7 +16,7 @@ struct VertexAttribute {
   GLint components = 0;
   GLenum type = 0;
   GLboolean normalised = 0;
-  std::uint32_t offset = 0;         ///< in the vertex as it is uploaded
+  std::uint32_t offset = 0;         ///< in the uploaded vertex
   std::uint32_t source_offset = 0;  ///< in the vertex as the bundle has it
   std::uint32_t bytes = 0;          ///< as the bundle has it
 };

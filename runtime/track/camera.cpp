@@ -50,7 +50,7 @@ Camera scaled_camera(const Camera& camera, int width, int height) {
   scaled.height = height;
   scaled.fx = camera.fx * scale;
   scaled.fy = camera.fy * scale;
-  // Pixel centres are integers, so a pixel's edge lies half a pixel before its centre.
+  // Pixel centres are integers, so a pixel's edge is half a pixel before its centre.
   scaled.cx = (camera.cx + 0.5) * scale - 0.5 - 0.5 * (camera.width * scale - width);
   scaled.cy = (camera.cy + 0.5) * scale - 0.5 - 0.5 * (camera.height * scale - height);
   return scaled;

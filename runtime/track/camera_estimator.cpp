@@ -16,15 +16,15 @@ namespace {
 
 constexpr std::size_t kMaxViews = 24;  // bounds time and memory
 constexpr int kViewSteps = 3;          // of a new view: the poses of the others hardly move
-// Standard deviations of what is known before: phones and webcams have 0.6 to 1.3 of the longer
-// side; pictures of prints that were photographed and rectified are off by some percent. With 0.05
-// a lens that bends passed for an aspect of 0.91 on a real sheet of 0.98 (`modar-lab bench wild`).
+// Prior standard deviation of the focal length, relative to the longer side. Smaller distrusts
+// unusual lenses, larger needs more views.
 constexpr double kFocalSpread = 0.3;
+// Prior standard deviation of a print's aspect. Larger lets a lens's distortion pass for an aspect.
 constexpr double kAspectSpread = 0.03;
 // Of a corner that a free homography measures, frame pixels of 640: lens distortion and paper that
 // is not quite flat weigh more than noise.
 constexpr double kPlaceSigma = 1.0;
-// Largest difference of two outlines' corners, after the similarity that brings them together, in
+// Largest difference of two outlines' corners, after the similarity that aligns them, in
 // mean distances of a corner from the middle: below it they are one view.
 constexpr double kAlike = 0.04;
 constexpr double kSame = 0.01;
@@ -43,7 +43,7 @@ double log_ratio_derivative(double q) {
 
 using Outline = std::array<glm::dvec2, 4>;
 
-/// Brings an outline's middle to 0, its mean distance from it to 1, and its first diagonal upright.
+/// Normalises an outline: middle 0, mean distance from it 1, first diagonal upright.
 Outline shape_of(const Outline& corners) {
   const glm::dvec2 middle = 0.25 * (corners[0] + corners[1] + corners[2] + corners[3]);
   double size = 0;

@@ -55,7 +55,7 @@ class CameraEstimator {
   struct KeptView {
     View view;
     std::array<double, 18> pose_by_shared{};  ///< how the pose follows: its step, and by the two
-    double cost = 0;                          ///< of what is left over, in sigmas squared
+    double cost = 0;                          ///< of the residuals, in sigmas squared
   };
   void linearise(KeptView& kept, double& matrix, double& vector);
   bool step();

@@ -13,8 +13,8 @@
 namespace modar::tracker {
 namespace {
 
-// Frames between attempts to find a covered pattern where its surroundings place it: trades the
-// time of an attempt, about that of tracking, for how soon the pattern is measured again.
+// Frames between attempts to find a covered pattern where its surroundings predict it. Fewer find
+// it sooner and take as long as tracking.
 constexpr int kLookEvery = 4;
 
 }  // namespace
@@ -92,22 +92,26 @@ Detection* ExtendedTracking::choose_anchor(TrackResult& result) {
 /// Whether so little of the anchor pattern fits, or is in view, that its surroundings had better
 /// not be learned from its pose.
 bool ExtendedTracking::doubts(const Detection& seen) const {
-  // Shares of the patches in view that fit, and of those that fitted a moment ago: what covers a
-  // pattern, or the little that the frame's edge leaves of it, gives poses that are off by degrees,
-  // where steady surroundings are off by tenths. Of few patches, which a small pattern has as well,
-  // most of the surroundings have to contradict. Swept on rooms: 0.25, 0.16 and 0.15 % with 0.6,
-  // 0.8 and 0.95 for the second; flat from 0.25 to 0.75 for the first, from 40 to 160 patches, and
-  // from 0.3 to 0.9 for the last.
-  constexpr double kFew = 0.5;
-  constexpr double kFewer = 0.8;
-  constexpr double kOfUsual = 0.5;
-  constexpr int kFewPatches = 80;
+  // Share of the patches in view that must fit before surroundings are learned. Lower learns from
+  // covered patterns, whose poses are wrong. [0.25, 0.75] tuned: extended
+  constexpr double kMinInlierShare = 0.5;
+  // Share of fitting patches below which known surroundings decide. Lower trusts covered patterns.
+  // [0.6, 0.95] tuned: extended
+  constexpr double kSureInlierShare = 0.8;
+  // Share of the usual number of patches below which known surroundings decide.
+  constexpr double kUsualShare = 0.5;
+  // Patches from which the pattern's own pose is trusted. Fewer trust small patterns. [40, 160]
+  // tuned: extended
+  constexpr int kSurePatches = 80;
+  // Share of the surroundings that must agree with a pose of few patches. Lower trusts small
+  // patterns more. [0.3, 0.9] tuned: extended
   constexpr double kContradicted = 0.6;
   const double share = 1.0 * seen.inliers / std::max(seen.matches, 1);
-  if (share < kFew) return true;
-  if ((share < kFewer || seen.inliers < kOfUsual * usual_patches_) && surroundings_.ready())
+  if (share < kMinInlierShare) return true;
+  if ((share < kSureInlierShare || seen.inliers < kUsualShare * usual_patches_) &&
+      surroundings_.ready())
     return true;
-  if (share >= kFewer && seen.inliers >= kFewPatches) return false;
+  if (share >= kSureInlierShare && seen.inliers >= kSurePatches) return false;
   return surroundings_.agreement(frames_.frame(), seen.pose) < kContradicted;
 }
 
@@ -160,7 +164,9 @@ bool ExtendedTracking::corners_of(const Pose& pose, std::array<glm::dvec2, 4>& c
 /// Whether two consecutive frames measure the same offset of the anchor pattern from the pose of
 /// the surroundings: the first features of a pattern that comes back can give any pose.
 bool ExtendedTracking::seen_twice(const Detection& seen, const Detection& followed) {
-  constexpr double kSame = 0.02;  // of the outline's diagonal. Swept on rooms: flat to 0.04
+  // Share of the outline's diagonal within which two poses are the same. Higher smooths more
+  // corrections.
+  constexpr double kSame = 0.02;
   std::array<glm::dvec2, 4> now;
   for (std::size_t i = 0; i < 4; ++i) now[i] = seen.corners[i] - followed.corners[i];
   const double diagonal = std::max(glm::length(followed.corners[2] - followed.corners[0]),

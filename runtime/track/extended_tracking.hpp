@@ -35,9 +35,9 @@ class ExtendedTracking {
   void step(TrackResult& result, const glm::dvec3* turn);
   /// Whether the last frame followed the surroundings.
   [[nodiscard]] bool following() const { return following_; }
-  /// Forgets what was learned with another focal length.
+  /// Forgets everything learned with another focal length.
   void forget_surroundings() { surroundings_.clear(); }
-  /// Forgets what was learned and shown.
+  /// Forgets everything learned and shown.
   void reset();
 
  private:
@@ -71,7 +71,7 @@ class ExtendedTracking {
   bool following_ = false;  ///< the last frame followed the surroundings
   bool guessed_ = false;    ///< and showed the pose that they gave
   PoseBlend blend_;
-  /// By which the last frame saw the anchor's corners beside where the surroundings had them.
+  /// Offset of the anchor's corners in the last frame from their place by the surroundings.
   std::optional<std::array<glm::dvec2, 4>> last_offset_;
 };
 

@@ -8,35 +8,33 @@
 namespace modar::tracker {
 namespace {
 
-// Share of the inlier ratio of the frames before under which a fit may be a neighbouring place:
-// other starts are tried. Higher costs time under every passing hand; 0.375 to 0.9 change no pose
-// of `modar-lab bench wild`, 1.05 (every frame) worsens the 95th percentile.
+// Share of the recent inlier ratio below which other starts are tried. Higher takes time under
+// every passing hand. [0.375, 0.9] tuned: wild
 constexpr double kSuspicious = 0.75;
-// Share of a coarser level's inlier ratio with which a sharp fit on a finer one stays: higher lets
-// what covers a print draw it away. Swept on prints covered to 70 %, held for 3 frames: 88.9, 87.5,
-// 80.6 and 75.0 % right with 0, 0.6, 0.8 and 1; half covered 100, 100, 97.2 and 95.8 %.
+// Share of a coarser level's inlier ratio at which a sharp fit on a finer one stays. Higher lets
+// occluders pull the pose away. [0, 1]
 constexpr double kSharpShare = 0.6;
-// And under which the pose is not shown: blur and a jerk had put it 37 to 74 pixels beside, at 0.34
-// to 0.48 of that ratio. After so many such frames it is lost: a search tells whether something
-// covers the pattern, or the pose is wrong.
+// Share of the recent inlier ratio below which the pose is not shown. Lower shows poses displaced
+// by blur, higher hides covered patterns.
 constexpr double kDoubtful = 0.5;
+// Doubtful frames in a row after which the track is lost and a search decides.
 constexpr int kMaxDoubts = 3;
-// Pixels by which the last prediction missed: up to them, refinement starts on the finest level or
-// one above, whose patches reach that far, and starts anew two above where that does not fit.
-// Smaller values cost time, larger ones a lost start more often.
-constexpr double kNearSurprise = 1.0;
-constexpr double kCloseSurprise = 2.5;
+// Pixels of the last prediction's error up to which refinement starts on the finest levels. Smaller
+// takes time, larger loses the start more often.
+constexpr double kNearError = 1.0;
+// The same for the start one level above.
+constexpr double kCloseError = 2.5;
 // Way of the pattern's centre between frames, pixels: less blurs too little to matter, and what
 // moves further is rarely found by the first alignment.
 constexpr double kMinBlurringWay = 4.0;
 constexpr double kMaxBlurringWay = 80.0;
 // Blurred templates must raise the mean correlation by so much to be used: below it is noise.
 constexpr double kMinBlurGain = 0.02;
-// A frame is suspected of blur if its correlation falls under so much of the sharp frames', which
-// fades by kFading a frame so that a change of light does not count as blur for ever. Swept on
-// tracking fast: corners jump by 0.65, 0.57 and 0.57 pixels with 0.9, 0.96 and 0.98, and by 0.65
-// and 0.57 with a fading of 0.95 and 0.99; all poses are right.
+// Share of a sharp frame's correlation below which blur is suspected. Lower misses blur, higher
+// takes time. [0.9, 0.98] tuned: pose
 constexpr double kBlurred = 0.96;
+// Factor per frame by which the sharp frames' correlation fades. Lower forgets sharp frames sooner
+// after a change of light.
 constexpr double kFading = 0.99;
 
 }  // namespace
@@ -73,15 +71,15 @@ double FrameTracker::distance(const TrackedPattern& pattern, const Pose& a, cons
 
 /// Refines the predicted pose, from no further away than the last prediction missed; where that
 /// does not fit as before, or nothing is known of before, from further away, too. On coarse levels
-/// what covers a print draws its pose away, and chance brings more inliers: they do not stand
+/// an occluder pulls the pose away, and chance adds inliers: they do not stand
 /// against what fits sharply on finer ones.
 bool FrameTracker::refine_predicted(const TrackedPattern& pattern, const Track& track, Pose& pose,
                                     PatchFit& fit) const {
   Pose near = pose;
   PatchFit near_fit;
   bool near_found = false;
-  if (!track.has_motion || track.surprise < kCloseSurprise) {
-    const bool close = track.has_motion && track.surprise >= kNearSurprise;
+  if (!track.has_motion || track.prediction_error < kCloseError) {
+    const bool close = track.has_motion && track.prediction_error >= kNearError;
     near_found = refine(pattern, frame(), close ? SearchRadius::kClose : SearchRadius::kNear, near,
                         near_fit);
     if (near_found && track.has_motion &&
@@ -168,7 +166,7 @@ bool FrameTracker::update_pose(const TrackedPattern& pattern, Track& track, Patc
   found = found || blurred;
   if (!blurred && fit.correlation > track.correlation) track.correlation = fit.correlation;
   track.correlation *= kFading;
-  // Nothing is known of the frames before a find: what is covered there is not suspected.
+  // Nothing is known of the frames before a find: covered parts there are not suspected.
   const bool suspicious =
       (track.has_motion || !fit.covered()) && fit.inlier_ratio() < kSuspicious * track.inlier_ratio;
   if (!found || (!blurred && suspicious)) {
@@ -182,9 +180,9 @@ bool FrameTracker::update_pose(const TrackedPattern& pattern, Track& track, Patc
   if (!track.has_motion) track.inlier_ratio = ratio;
   track.doubts = ratio < kDoubtful * track.inlier_ratio ? track.doubts + 1 : 0;
   if (track.doubts > kMaxDoubts) return false;
-  track.restless = fit.restless() ? track.restless + 1 : 0;
+  track.inconsistent = fit.inconsistent() ? track.inconsistent + 1 : 0;
   if (track.doubts == 0) track.inlier_ratio = 0.8 * track.inlier_ratio + 0.2 * ratio;
-  track.surprise = distance(pattern, predicted, pose);
+  track.prediction_error = distance(pattern, predicted, pose);
   track.previous = track.pose;
   track.pose = pose;
   track.has_motion = true;

@@ -9,12 +9,11 @@
 
 namespace modar::tracker {
 
-/// Frames for which a lost pattern is searched for first, and in every frame: two seconds, in which
-/// a hand that was in the way is gone. Trades the time of those searches for how fast a pattern
-/// comes back.
+/// Frames in which a lost pattern is searched first, and in every frame. More find it sooner after
+/// a hand passed, and take time.
 inline constexpr int kRecentFrames = 60;
 
-/// What is known of a pattern from frame to frame.
+/// State of a pattern from frame to frame.
 struct Track {
   bool tracked = false;
   bool homography_only = false;  ///< no pose of the camera explains it: its plane map is tracked
@@ -24,9 +23,10 @@ struct Track {
   PlaneMap map;             ///< if homography_only
   double inlier_ratio = 1;  ///< of the patches in view; running mean of the frames before
   double correlation = 0;   ///< of the patches, in the sharp frames before
-  double surprise = 1e9;    ///< pixels by which the last prediction missed the pattern's centre
-  int doubts = 0;           ///< frames in a row whose fit contradicts the frames before: not shown
-  int restless = 0;         ///< frames in a row whose patches contradict each other
+  double prediction_error =
+      1e9;               ///< pixels by which the last prediction missed the pattern's centre
+  int doubts = 0;        ///< frames in a row whose fit contradicts the frames before: not shown
+  int inconsistent = 0;  ///< frames in a row whose patches contradict each other
   int frames_since_lost = kRecentFrames;
   Reason last_reason = Reason::kNoFeatures;  ///< why it is not tracked
   Reason shown_reason = Reason::kVisible;    ///< why it is tracked and not shown, if it is not
@@ -36,7 +36,7 @@ struct Track {
   bool again = false;                        ///< it was lost a moment before it was found
 };
 
-/// The present frame, and the steps that bring tracks to it.
+/// The present frame, and the steps that move tracks to it.
 class FrameTracker {
  public:
   FrameTracker(const Camera& camera, const DetectOptions& options);
@@ -46,7 +46,7 @@ class FrameTracker {
   [[nodiscard]] FrameView frame() const {
     return {camera_, extractor_->pyramid(), kernels_, *patches_};
   }
-  /// Brings a track to the present frame; false if the pattern is lost, with track.last_reason.
+  /// Moves a track to the present frame; false if the pattern is lost, with track.last_reason.
   bool update(const TrackedPattern& pattern, Track& track, Detection& detection);
   /// Fills in pattern, pose and corners; false if no camera could see the pattern there.
   bool locate(const TrackedPattern& pattern, const Track& track, Detection& detection) const;

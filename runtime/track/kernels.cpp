@@ -330,8 +330,7 @@ void sample_patch(const PatchPlace& place, const std::uint8_t* pixels, std::ptrd
     const auto lower = hn::Add(c, hn::Mul(fx, hn::Sub(e, c)));
     hn::Store(hn::Add(upper, hn::Mul(fy, hn::Sub(lower, upper))), d, out + k);
   }
-  constexpr int kSide = 2 * kPatchHalf + 1;
-  for (int i = kSide * kSide; i < kPatchPixels; ++i) out[i] = 0.0f;
+  for (int i = kPatchSide * kPatchSide; i < kPatchPixels; ++i) out[i] = 0.0f;
 }
 
 float sum_of_four(const float* lanes) {

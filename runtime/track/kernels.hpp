@@ -13,10 +13,10 @@ inline constexpr int kSlack = 64;       ///< elements past a range that kernels 
 inline constexpr int kBlockCodes = 32;  ///< codes in a block; byte k of all of them is contiguous
 inline constexpr int kCodeBytes = 32;   ///< 256 bits
 
-/// A tracking patch is 9x9 pixels: smaller ones match more places, larger ones cross more edges of
-/// what lies before the pattern. Set by hand (the study used 11x11); baked patches keep that
-/// distance from the border.
+/// Half side of a tracking patch, pixels. Smaller patches match in more places, larger ones cross
+/// more occluders' edges. Records depend on it.
 inline constexpr int kPatchHalf = 4;
+inline constexpr int kPatchSide = 2 * kPatchHalf + 1;
 inline constexpr int kPatchPixels = 84;  ///< those 81, padded to whole vectors
 
 /// A pattern's patch for alignment: gray values and half differences to the right and down, row by
@@ -33,10 +33,9 @@ struct PatchOffsets {
   alignas(16) float right[kPatchPixels] = {};
   alignas(16) float down[kPatchPixels] = {};
   constexpr PatchOffsets() {
-    constexpr int kSide = 2 * kPatchHalf + 1;
-    for (int k = 0; k < kSide * kSide; ++k) {
-      right[k] = static_cast<float>(k % kSide - kPatchHalf);
-      down[k] = static_cast<float>(k / kSide - kPatchHalf);
+    for (int k = 0; k < kPatchSide * kPatchSide; ++k) {
+      right[k] = static_cast<float>(k % kPatchSide - kPatchHalf);
+      down[k] = static_cast<float>(k / kPatchSide - kPatchHalf);
     }
   }
 };
@@ -76,11 +75,11 @@ struct Kernels {
   void (*peaks)(const std::uint8_t* above, const std::uint8_t* row, const std::uint8_t* below,
                 int count, std::uint8_t* peak);
   /// Hamming distances (at most 255) of a code to blocks of kBlockCodes; returns the smallest.
-  /// Blocks none of whose codes lies within `limit` over their first 16 bytes get 255
+  /// Blocks none of whose codes is within `limit` over their first 16 bytes get 255
   /// throughout.
   int (*distances)(const std::uint8_t* code, const std::uint8_t* blocks, std::size_t block_count,
                    int limit, std::uint8_t* out);
-  /// Samples the image bilinearly under a patch that lies inside with a pixel to spare. Its sums
+  /// Samples the image bilinearly under a patch that is inside with a pixel to spare. Its sums
   /// are added in the same order at every level: four partial ones, each of every fourth pixel.
   PatchSums (*patch_sums)(const PatchTemplate& patch, const PatchPlace& place,
                           const std::uint8_t* pixels, std::ptrdiff_t stride);

@@ -12,13 +12,12 @@
 namespace modar::tracker {
 namespace {
 
-constexpr int kSide = 2 * kPatchHalf + 1;
-constexpr float kPixels = kSide * kSide;
+constexpr float kPixels = kPatchSide * kPatchSide;
 
 // ---- Templates ----
 
 constexpr int kRing = 2;  // pixels around a patch: one for the smoothing, one for the differences
-constexpr int kWide = kSide + 2 * kRing;
+constexpr int kWide = kPatchSide + 2 * kRing;
 using WidePatch = std::array<float, kWide * kWide>;
 
 void add_sums(Patch& patch) {
@@ -46,18 +45,18 @@ void smooth(const float* from, int step, int first, int last, float* to) {
 }
 
 /// Smooths about as much as a lens does, then differentiates. A template sharper than the frame is
-/// drawn aside by what lies on the patch's edge, each patch in its own direction: a constant error
-/// of the pose. Smoothing brought tracked corners from 0.057 to 0.016 px of the truth.
+/// pulled aside by texture on the patch's edge, each patch in its own direction: a constant error
+/// of the pose. Smoothing reduces the error of tracked corners from 0.057 to 0.016 px.
 void fill(const WidePatch& gray, Patch& patch) {
   constexpr int kAll = kWide * kWide;
   WidePatch rows{};
   WidePatch both{};
   smooth(gray.data(), 1, 1, kAll - 1, rows.data());
   smooth(rows.data(), kWide, kWide, kAll - kWide, both.data());
-  for (int v = 0; v < kSide; ++v) {
-    for (int u = 0; u < kSide; ++u) {
+  for (int v = 0; v < kPatchSide; ++v) {
+    for (int u = 0; u < kPatchSide; ++u) {
       const float* at = both.data() + (v + kRing) * kWide + u + kRing;
-      const int k = v * kSide + u;
+      const int k = v * kPatchSide + u;
       patch.pixels.gray[k] = at[0];
       patch.pixels.right[k] = 0.5f * (at[1] - at[-1]);
       patch.pixels.down[k] = 0.5f * (at[kWide] - at[-kWide]);
@@ -182,12 +181,10 @@ bool inside(const PatchPlace& place, const GrayImage& image) {
 }
 
 PatchNormalEquations equations_of(const Patch& p, const PatchSums& s, float tukey) {
-  // Squared gray values. Below kFlat a template shows nothing, and the frame nothing below a
-  // quarter of it, for darker exposures. kNoise keeps the weight 1 / variance of plain patches
-  // finite: from there down it is noise that decides what a patch is worth. Swept on area
-  // 0.02-0.05: 56.7 % right with 1 to 16 and with 15 to 60; corners are 0.100, 0.096 and 0.093
-  // pixels off with 15, 30 and 60 for the second.
+  // Squared grey values below which a template shows nothing.
   constexpr float kFlat = 4.0f;
+  // Squared grey values of noise, which bound the weight, inverse variance, of flat patches. [15,
+  // 60] tuned: pose
   constexpr float kNoise = 30.0f;
   PatchNormalEquations out;
   const float inverse = 1.0f / kPixels;
@@ -198,7 +195,7 @@ PatchNormalEquations equations_of(const Patch& p, const PatchSums& s, float tuke
   out.correlation = (s.ti * inverse - p.t * inverse * s.i * inverse) / std::sqrt(var_t * var_i);
   const float miss = (1.0f - out.correlation) / tukey;
   if (miss >= 1.0f) return out;
-  // The frame is brought to the template's contrast.
+  // The frame is scaled to the template's contrast.
   const float weight = (1.0f - miss * miss) * (1.0f - miss * miss) / (var_t + kNoise);
   out.xx = weight * (p.xx - p.x * p.x * inverse);
   out.xy = weight * (p.xy - p.x * p.y * inverse);
@@ -233,10 +230,11 @@ glm::vec2 displacement(const PatchNormalEquations& equations) {
 
 namespace {
 
-// Variance of a frame's blur, pixels of a level: of a lens in focus on the finest, of a pixel's
-// area and of the interpolation on all; and what fill() smooths, template pixels. Estimates.
+// Variance of a lens's blur in focus, pixels of the finest level. An estimate.
 constexpr double kLensVariance = 0.42;
+// Variance of the blur of a pixel's area and of interpolation, pixels of each level. An estimate.
 constexpr double kSampleVariance = 0.25;
+// Variance that fill() smooths by, template pixels.
 constexpr double kTemplateVariance = 0.5;
 
 /// The variance of a frame's blur, template pixels: of its square in x and y, and of their product.
@@ -272,7 +270,7 @@ glm::dvec2 blur_way(const BlurVariance& blur) {
 }
 
 /// Makes those templates of a view anew whose part of a curved surface is seen from another side
-/// than when they were made: as sharp as the picture they put rendered labels 0.033 px beside their
+/// than when they were made: as sharp as the picture they put rendered labels 0.033 px off their
 /// place, blurred like this 0.019.
 void foreshorten(const TrackedPattern& pattern, const FrameView& frame, const PlaneMap& map,
                  const PatchView& view) {
@@ -316,7 +314,7 @@ bool observe_patch(const PatchView& view, const PlaneMap& map, const Patch& patc
   const double grow = static_cast<double>(1 << view.at.pattern_level);
   bool in_front = false;
   const glm::dmat2 d = map.derivative(patch.centre) * (grow * shrink);
-  // Of the offsets -4 to 4 of a patch's columns; what blurs a pixel lies around it likewise.
+  // Of the offsets -4 to 4 of a patch's columns; the blur of a pixel is around it likewise.
   double mean_square = kPatchHalf * (kPatchHalf + 1) / 3.0;
   if (map.surface != nullptr) mean_square += blur_variance(d, view.at.frame_level).xx;
   out.pixel = map.at(patch.centre, in_front, mean_square * grow * grow);
@@ -373,18 +371,16 @@ Resolution finest(const TrackedPattern& pattern, const PlaneMap& map, int frame_
 
 namespace {
 
-// Pixels of the level: steps below it end a stage. Lower gains accuracy that the last stage brings
-// anyway and costs steps.
+// Pixels of the level below which a step ends a stage. Lower takes steps for accuracy that the last
+// stage reaches anyway.
 constexpr double kConverged = 0.1;
-// The same for steps over all patches: with 0.1 what the prediction left over stayed in the pose;
-// 0.03 made every second frame of `scripts/foreign.sh budget` take one step more, which is a third
-// of its cost, and corners on five real clips no better.
+// The same for steps over all patches. Higher keeps the prediction's error in the pose, lower takes
+// more steps.
 constexpr double kPreciselyConverged = 0.045;
-// Patches for the steps before the last ones, which only have to come near. A study measured the
-// price of 40 patches in all steps: an error of 0.050 px instead of 0.040, at 7/8 of the time.
+// Patches of all steps but the last ones. Fewer are faster and less exact.
 constexpr std::size_t kCoarsePatches = 40;
-// Steps over all patches; a converged pose ends earlier. Bounds the time of one that does not.
-// Swept on tracking fast: corners are 0.59, 0.59 and 0.58 pixels off with 5, 10 and 20.
+// Steps over all patches; a converged pose ends earlier. Bounds the time of one that does not. [5,
+// 20] tuned: pose
 constexpr int kPreciseSteps = 10;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -448,7 +444,7 @@ bool solve(MapEquations& equations, Vector8& change) {
 /// Replaces the patches of a view by blurred ones where the motion exceeds a pixel of the level.
 void apply_motion_blur(const TrackedPattern& pattern, const FrameView& frame, const Pose& pose,
                        PatchView& view) {
-  constexpr double kLeast = 1.0;
+  constexpr double kMinMotion = 1.0;
   if (frame.blur == nullptr || frame.blur->share <= 0.0) return;
   const PlaneMap now = map_of_pose(pattern, frame.camera, pose);
   const PlaneMap then = map_of_pose(pattern, frame.camera, frame.blur->previous);
@@ -462,7 +458,7 @@ void apply_motion_blur(const TrackedPattern& pattern, const FrameView& frame, co
     const glm::dvec2 way = now.at(patch.centre, in_front) - then.at(patch.centre, was_in_front);
     if (!in_front || !was_in_front) continue;
     const glm::dvec2 motion = frame.blur->share * shrink * way;
-    if (glm::length(motion) < kLeast) {
+    if (glm::length(motion) < kMinMotion) {
       blurred.push_back(patch);
       continue;
     }
@@ -573,15 +569,15 @@ double robust_weight(const PatchLinearisation& patch, const Vector6& change) {
 
 /// Weight of a patch by the share of what the frame shows there that its template does not explain:
 /// noise, which plain patches have most of, what covers a part of it, a surface that turns away. On
-/// six patterns it brought tracked corners from 0.0165 to 0.0115 px of the truth (of a photo that
+/// six patterns it reduces the error of tracked corners from 0.0165 to 0.0115 px (of a photo that
 /// is itself blurred from 0.046 to 0.027) and jitter from 0.0125 to 0.0086, and of those covered to
-/// 70 % and found all instead of 95 % lie right; rendered labels went from 0.042 to 0.025 px.
-/// Under motion blur all weigh alike: those along the motion fit best, and say least of it.
+/// 70 % and found all instead of 95 % are right; rendered labels went from 0.042 to 0.025 px. Under
+/// motion blur all weigh alike: those along the motion fit best, and say least of it.
 double trust(const FrameView& frame, const PatchLinearisation& patch) {
-  constexpr double kLeast = 0.003;  // noise that every patch has; 0.001 to 0.03 do nearly alike
+  constexpr double kNoiseVariance = 0.003;  // of every patch; 0.001 to 0.03 are nearly equal
   if (frame.blur != nullptr) return 1.0;
   const double correlation = static_cast<double>(patch.equations.correlation);
-  return kLeast / (kLeast + 1.0 - correlation * correlation);
+  return kNoiseVariance / (kNoiseVariance + 1.0 - correlation * correlation);
 }
 
 /// One step on the pose. Returns the displacement of its corners, pixels of the level; negative if
@@ -689,7 +685,7 @@ bool solve(const PlaneEquations& sum, std::array<double, 6>& step, PlaneChange& 
 
 }  // namespace
 
-double unrest_of(std::span<const PatchLinearisation> patches) {
+double residual_rms_of(std::span<const PatchLinearisation> patches) {
   constexpr float kMost = 2.0f;
   double sum = 0.0;
   int count = 0;
@@ -773,13 +769,13 @@ PatchFit align(const TrackedPattern& pattern, const FrameView& frame, int frame_
   }
   const float tukey = precise && fit.covered() ? kTukeyCovered : kTukey;
   for (int step = 0; step < (precise ? kPreciseSteps : 1) && moved >= 0.0; ++step) {
-    // The fit is that of the pose before the step, which lies near enough to be judged by it.
+    // The fit is that of the pose before the step, which is near enough to be judged by it.
     moved = step_pose(pattern, frame, view, tukey, precise, pose, fit);
     if (moved < (precise ? kPreciselyConverged : kConverged)) break;
   }
   if (precise && frame.blur == nullptr && pattern.surface.flat() &&
       fit.inlier_ratio() < kLittleShown) {
-    fit.unrest = unrest_of(frame.patches.last_linearisations());
+    fit.residual_rms = residual_rms_of(frame.patches.last_linearisations());
   }
   return fit;
 }

@@ -23,16 +23,15 @@ namespace modar::tracker {
 /// trades the time of a frame's last steps for accuracy.
 inline constexpr std::size_t kMaxPatches = 256;
 
-/// Correlation from which a patch counts as an inlier. Blur and noise lower it for every patch,
-/// chance agreement of edges reaches 0.5. On `modar-lab bench wild` nothing changes from 0.35 to
-/// 0.84; at 0.98, 1 % of the frames is lost.
+/// Correlation from which a patch is an inlier. Lower accepts chance edges, higher loses blurred
+/// patches. [0.35, 0.84] tuned: wild
 inline constexpr float kInlierCorrelation = 0.7f;
-/// Correlation from which a patch looks closely like its template, and how many of those speak for
-/// a place by themselves: the most that chance brought in 600 cluttered frames were 7.
+/// Correlation from which a patch is a close match of its template.
 inline constexpr float kCloseCorrelation = 0.9f;
+// Close patches that confirm a place alone. Chance gave at most 7 in clutter.
 inline constexpr int kClosePatches = 24;
-/// 1 minus the correlation at which a patch loses its weight. In the first step the pose is still
-/// off, and even patches that hardly correlate point in the right direction.
+/// 1 minus the correlation at which a patch loses its weight, first step. High, since patches that
+/// hardly correlate still pull in the right direction.
 inline constexpr float kTukeyFirst = 1.0f;
 inline constexpr float kTukey = 0.7f;
 /// The same in the last steps on a covered pattern, whose other patches correlate by chance.
@@ -123,16 +122,16 @@ struct Resolution {
 };
 Resolution finest(const TrackedPattern& pattern, const PlaneMap& map, int frame_levels);
 
-/// Features that by themselves speak for a place, so that less of the pattern need show there:
-/// chance brought at most 10 in 1,500 cluttered frames.
-inline constexpr int kVouching = 16;
+/// Features that confirm a place alone, so that fewer cells suffice. Lower accepts clutter; chance
+/// gave at most 10.
+inline constexpr int kConfirmingFeatures = 16;
 
-/// Inlier ratio below which so little of a flat pattern shows that chance patches on what hides it
-/// may hold its pose beside its place, and the displacement, rms template pixels, by which inliers
-/// then give that away. Of 661 poses of prints covered to 70 %, 21 of the 26 over 5 pixels beside
-/// lay above, and 10 of the 635 others; half-covered prints have a ratio of 0.45.
+/// Inlier ratio of a flat pattern below which chance patches on an occluder may hold a wrong pose.
+/// Higher tests more poses.
 inline constexpr double kLittleShown = 0.35;
-inline constexpr double kUnrest = 0.35;
+// Rms residual of the inliers, template pixels, above which such a pose is wrong. Lower rejects
+// true poses, higher accepts wrong ones.
+inline constexpr double kMaxResidual = 0.35;
 
 /// How a pattern's patches fit the frame.
 struct PatchFit {
@@ -142,22 +141,23 @@ struct PatchFit {
   int level = 0;                  ///< pyramid level of the frame
   double correlation = 0;         ///< mean over the visible patches, negative ones counted as 0
   double inlier_correlation = 0;  ///< mean over the inliers
-  double unrest = 0;  ///< of a flat pattern of which little shows: rms of what the inliers ask for
+  double residual_rms =
+      0;  ///< of a flat pattern of which little shows: rms of what the inliers ask for
   [[nodiscard]] double inlier_ratio() const { return visible > 0 ? 1.0 * inliers / visible : 0.0; }
-  /// So many patches fit that nothing covers much of the pattern. Swept on 70 % covered: 89.2 %
-  /// right from 0.4 to 0.8.
+  /// Enough patches fit to show that nothing covers much of the pattern. Swept on 70 % covered:
+  /// 89.2 % right from 0.4 to 0.8.
   [[nodiscard]] bool open() const { return inlier_ratio() >= 0.6; }
   /// Few patches fit, but these do so as nothing blurred does: something covers the others. Swept
   /// on 70 % covered: 88.3, 89.2 and 85.8 % right with 0.7, 0.85 and 0.95.
   [[nodiscard]] bool covered() const { return !open() && inlier_correlation >= 0.85; }
   /// The patches that fit contradict each other: chance holds some of them, and the pose.
-  [[nodiscard]] bool restless() const { return unrest >= kUnrest; }
+  [[nodiscard]] bool inconsistent() const { return residual_rms >= kMaxResidual; }
   /// Six inliers determine a pose with a margin of two; a ratio of 0.3 keeps chance agreement out,
   /// while thirty inliers may be a fifth: half-covered patterns went from 95 to 98.8 % right by
-  /// that, with no false recognition in 20,000 cluttered frames; a seventh of 36 gave one.
-  /// With kClosePatches an eighth is enough: patterns covered to 70 % went from 75 to 92 % right.
-  /// An eighth for which features vouch brought 85 %, and poses 20 to 50 pixels beside where no
-  /// patches were close.
+  /// that, with no false recognition in 20,000 cluttered frames; a seventh of 36 gave one. With
+  /// kClosePatches an eighth is enough: patterns covered to 70 % went from 75 to 92 % right. An
+  /// eighth that features confirm gave 85 %, and poses 20 to 50 pixels off where no patches were
+  /// close.
   [[nodiscard]] bool good() const {
     const int part = close >= kClosePatches ? 8 : 5;
     return inliers >= 6 &&
@@ -173,8 +173,8 @@ struct PatchFit {
 PatchFit align(const TrackedPattern& pattern, const FrameView& frame, int frame_level, int steps,
                bool precise, Pose& pose);
 
-/// See PatchFit::unrest; each patch counts as two pixels at most.
-double unrest_of(std::span<const PatchLinearisation> patches);
+/// See PatchFit::residual_rms; each patch counts as two pixels at most.
+double residual_rms_of(std::span<const PatchLinearisation> patches);
 
 /// How the patches fit at a pose, without moving it.
 PatchFit evaluate(const TrackedPattern& pattern, const FrameView& frame, int frame_level,
@@ -205,7 +205,7 @@ PatchFit align_map(const TrackedPattern& pattern, const FrameView& frame, int fr
 /// The patch around a pixel of any picture; false if it or its ring crosses the border.
 bool cut_patch(const GrayImage& image, int column, int row, Patch& patch);
 
-/// What a patch says of its displacement at a place of a picture; false if it does not lie inside.
+/// What a patch says of its displacement at a place of a picture; false if it is not inside.
 /// tukey: 1 minus the correlation at which its weight reaches zero.
 bool observe_patch_at(const Patch& patch, const PatchPlace& place, const GrayImage& image,
                       const Kernels& kernels, float tukey, PatchNormalEquations& out);
@@ -235,7 +235,7 @@ struct PatchObservation {
   glm::dmat2 jacobian{};  ///< template pixels to pixels of the level
 };
 
-/// False if the patch does not lie inside the level. tukey: 1 minus the correlation at which a
+/// False if the patch is not inside the level. tukey: 1 minus the correlation at which a
 /// patch's weight reaches zero.
 bool observe_patch(const PatchView& view, const PlaneMap& map, const Patch& patch, float tukey,
                    PatchObservation& out);
@@ -250,7 +250,7 @@ PoseJacobian pose_jacobian(const Camera& camera, const Pose& pose, const glm::dv
                            double scale);
 /// Applies such a rotation and translation. Returns the largest displacement of the pattern's four
 /// corners, pixels of the level: corners, since a visible part alone moves little where the rest
-/// hangs on it like on a lever. Negative, and no change, if the pose would lie behind the camera.
+/// hangs on it like on a lever. Negative, and no change, if the pose would be behind the camera.
 double move_pose(const TrackedPattern& pattern, const Camera& camera, double scale,
                  const std::array<double, 6>& change, Pose& pose);
 

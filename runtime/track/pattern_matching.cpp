@@ -15,13 +15,11 @@
 namespace modar::tracker {
 namespace {
 
-// Bits, of 256: largest distance of a match. Trades steep and blurred views, which differ by more
-// from the baked ones, for chance matches, which the vote below has to sort out. Swept on tilt
-// 75-80: 62.5, 63.3 and 63.3 % recognised with 56, 72 and 88; area 0.02-0.05 is flat.
+// Bits of the largest distance of a match. Higher adds steep and blurred views, and chance matches.
+// [56, 88] tuned: pose
 constexpr int kMaxDistance = 72;
-// Bits of a code's first half up to which a block of codes is compared in full: trades matches
-// whose differences crowd there for the time of all other blocks. Swept on tilt 75-80: 59.2, 57.5
-// and 57.5 % right with 36, 44 and 52; area 0.02-0.05 is flat.
+// Bits of a code's first half up to which a block of codes is compared in full. Higher finds more
+// matches and takes time. [36, 52] tuned: pose
 constexpr int kMaxHalfDistance = 44;
 // Ratio test, percent of the second best: 90 after the study of detectors that this loop follows.
 // Lower loses repeated texture, higher lets ambiguous matches through.
@@ -435,17 +433,15 @@ void PlaneMatcher::select(const TrackedPattern& pattern, const HomographyHypothe
 
 namespace {
 
-// Codes of a pattern and polarity in the index, the most repeatable: trades memory and time for
-// patterns seen from views whose codes come later, steep ones say. 128 or more, and so many for all
-// patterns together where that is more, 3 MB: with a sixth of them 14 patterns were found in 65 %
-// at tilts of 70 to 75 degrees, with all in 77 %, each alone in 82 % (84 frames).
+// Codes of a pattern and polarity in the index at least. More find steep views and take memory and
+// time.
 constexpr std::size_t kLeastIndexed = 128;
+// Codes of all patterns in the index, if that gives each more than the least; 3 MB.
 constexpr std::size_t kIndexedInAll = 43008;
+// Codes of a pattern and polarity in the index at most.
 constexpr std::size_t kMostIndexed = 1536;
-// Bits: a code further away casts no vote. Tighter than a match, since it is held against all
-// patterns' codes. Of 50 patterns (`modar-lab bench pose --many=50 --frames 30`) 86.7, 90.0
-// and 90.0 % are right at tilts of 60 to 70 degrees with 48, 60 and 72, 70.0, 70.0 and 66.7 % at 70
-// to 75, and 16.7, 20.0 and 20.0 % at 75 to 80.
+// Bits beyond which a code casts no vote; tighter than a match, since all patterns' codes compete.
+// [48, 72] tuned: many
 constexpr int kMaxVoteDistance = 60;
 // Votes of a pattern that its other votes are compared with; with more, every n-th. Bounds the time
 // of a pattern that takes all votes.
@@ -533,7 +529,8 @@ bool CodeIndex::build(std::int64_t& work) {
     }
   }
   if (codes_.empty()) return;
-  // So many words that comparing with them and with the codes of a few costs about the same.
+  // The number of words for which comparing with them and with the codes of a few costs about the
+  // same.
   const double balanced = std::sqrt(2.0 * static_cast<double>(codes_.size()));
   const std::size_t words = (static_cast<std::size_t>(balanced) / kBlockCodes + 1) * kBlockCodes;
   group.words.resize(words * kCodeBytes);

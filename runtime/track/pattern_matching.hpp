@@ -24,11 +24,10 @@ namespace modar::tracker {
 /// it.
 inline constexpr std::size_t kMinMatches = 6;
 
-/// Matches whose affine map is voted on, those of least distance first: their number times that of
-/// the matches is the vote's cost, and with the spare features all vote. Swept there on area
-/// 0.02-0.05: 55.6, 60.4, 66.7 and 67.4 % right with 96, 192, 384 and 1000; on tilt 75-80: 56.9,
-/// 60.4, 68.8 and 72.2.
+/// Matches whose affine map is voted on, nearest first. More find small and tilted patterns; cost
+/// is proportional. [96, 1000] tuned: pose
 inline constexpr std::size_t kVotes = 96;
+// The same with the spare features, where all vote.
 inline constexpr std::size_t kSpareVotes = 1000;
 
 /// A frame's feature and the pattern's feature that it resembles, with the local affine map that
@@ -43,7 +42,7 @@ struct FeatureMatch {
 
 /// Leaves the lens distortion in `ideal` and sets no distance.
 FeatureMatch match_of(const TrackerFeatureRecord& record, const TrackerFeature& feature);
-/// Whether `other` lies where the affine map of `hypothesis` puts it, with a similar shape.
+/// Whether `other` is where the affine map of `hypothesis` puts it, with a similar shape.
 bool agrees(const FeatureMatch& hypothesis, const FeatureMatch& other);
 
 /// A homography that some of the matches agree with.
@@ -67,10 +66,9 @@ class PlaneMatcher {
   std::span<const HomographyHypothesis> find(const TrackedPattern& pattern,
                                              std::span<const TrackerFeature> features);
   /// The same in slices: match() with `next` 0 at first until it returns true, a vote, then
-  /// hypotheses().
-  /// Of the first `count` features every second comes first, and `end` counts in that order; after
-  /// hypotheses() match() may go on to a greater one. work: about how many ARMv7 instructions
-  /// match() may take; it subtracts what it took.
+  /// hypotheses(). Of the first `count` features every second comes first, and `end` counts in that
+  /// order; after hypotheses(), match() may continue to a greater one. work: about how many ARMv7
+  /// instructions match() may take; it subtracts what it took.
   bool match(const TrackedPattern& pattern, std::span<const TrackerFeature> features,
              std::size_t count, std::size_t end, std::size_t& next, std::int64_t& work);
   /// Counts the matches that agree with each of the `most` nearest ones: vote() until it returns
@@ -81,9 +79,9 @@ class PlaneMatcher {
   [[nodiscard]] std::size_t max_features() const { return matches_.capacity(); }
   /// Matches of the last find().
   [[nodiscard]] int matches() const { return static_cast<int>(matches_.size()); }
-  /// Of a pattern that is not flat: goes on from the part of it that a hypothesis took for flat
-  /// over all that is turned to the camera, and makes the matches found there the hypothesis'
-  /// inliers. Returns how many poses explain them, the better one first.
+  /// Of a pattern that is not flat: extends from the part of it that a hypothesis took for flat to
+  /// all parts turned to the camera, and makes the matches found there the hypothesis' inliers.
+  /// Returns how many poses explain them, the better one first.
   int spread(const TrackedPattern& pattern, std::size_t hypothesis, std::array<Pose, 2>& poses);
   /// Matches that a hypothesis of the last find() misses by `near` to `far` frame pixels, but whose
   /// scale and direction it has right.
@@ -134,7 +132,7 @@ class CodeIndex {
   /// The patterns must outlive it.
   CodeIndex(std::span<const TrackedPattern> patterns, const Kernels& kernels,
             std::size_t max_features);
-  /// Goes on indexing the most repeatable codes of each pattern, 9 KB a pattern or more, until it
+  /// Continues indexing the most repeatable codes of each pattern, 9 KB a pattern or more, until it
   /// returns true; then vote() may be called, which allocates nothing. work: about how many ARMv7
   /// instructions it may take; it subtracts what it took.
   bool build(std::int64_t& work);
@@ -147,8 +145,8 @@ class CodeIndex {
   std::span<const Support> vote(std::span<const TrackerFeature> features);
 
  private:
-  /// Words whose codes a feature is compared with: trades time for votes that the nearest word
-  /// alone misses. With four, 99 % of what a linear search finds in 50 patterns has the most votes.
+  /// Words whose codes a feature is compared with. More find votes that the nearest word misses,
+  /// and take time.
   static constexpr std::size_t kProbes = 4;
 
   /// Codes of one polarity, in blocks as Kernels::distances() takes them.

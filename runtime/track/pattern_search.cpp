@@ -13,65 +13,62 @@
 namespace modar::tracker {
 namespace {
 
-// Features that agree with a homography, below which nothing is detected.
-// Trades small and covered patterns for time in clutter, where the photometric check then has to
-// refuse what chance brings. Swept on area 0.02-0.05: 56.7 % right with 4 and 6, 45.8 % with 12.
+// Features that agree with a homography at least. Lower finds small and covered patterns and takes
+// time in clutter. [4, 12] tuned: pose
 constexpr int kMinInliers = 6;
-// A place whose finest patches do not fit: so end 3 of 2,328 true detections, and every false one
-// (in 11,000 cluttered frames no place fitted on the finest level). So much of it must correlate,
-// in so many cells (a pattern with 8 of 11 cells alike was seen 16 times in a street's video), and
-// the features must lie within so many sigmas: with them 0 false in 20,000 cluttered frames.
+// Percent of the cells that must correlate where the finest patches do not fit. Lower accepts
+// clutter.
 constexpr int kVaguePercent = 60;
+// Cells that must correlate there. Lower accepts prints that look alike by chance.
 constexpr int kVagueCells = 24;
+// Reprojection rms of the features there, sigmas, at most.
 constexpr double kVagueRms = 3.0;
-constexpr double kVouchedRms = 3.0;  // the same of features that speak for a place by themselves
-// For a pose found with the spare features that the features do not vouch for: percent of the cells
-// that must correlate. Lower accepts poses that keep better ones from being tried: covered to 70 %,
-// 89.6 % right with 60 and with 45, 87.5 without a limit; another seed, and small and tilted
-// patterns, are the same with all three.
+constexpr double kConfirmedRms = 3.0;  // the same of features that speak for a place by themselves
+// Percent of the cells for a pose from spare features that are too few to confirm it. Lower keeps
+// better poses from being tried. [45, 60] tuned: pose
 constexpr int kSparePercent = 60;
-// Reprojection RMS after patches took over, of that before (and a sigma), above which the place
-// loses its score: patches on the edge of an occluder draw a pose away from what all features say.
-// Swept on 70 % covered: 89.2 % right with 1.5 and 3, 88.3 % with 6 and without.
+// Ratio of the reprojection rms after and before patches took over, above which a place has no
+// score. Higher accepts poses pulled by occluders. [1.5, 6] tuned: pose
 constexpr double kWrongRms = 3.0;
-// Divides the score of a place whose patches contradict each other, so that nearly any other is
-// better. Swept on 70 % covered, with a known camera: 87.5 % right with 1 to 1000, but with 1 one
-// pose of 120 fewer is found.
-constexpr int kRestlessShare = 8;
-// Of two mirror images, reprojection RMS of one by that of the better one, up to which it is tried,
-// too. Swept on 70 % covered: 86.7, 89.2 and 89.2 % right with 0.75, 1.5 and 3.
+// Divisor of the score of a place whose patches contradict each other. [1, 1000] tuned: pose
+constexpr int kInconsistentDivisor = 8;
+// Ratio of two mirror images' reprojection rms up to which both are tried. Lower misses true poses,
+// higher takes time. [0.75, 3] tuned: pose
 constexpr double kMirrorRms = 1.5;
-// Inlier ratio of patches from which nothing hides the pattern, so that further hypotheses are not
-// tried, and from which the mirror image cannot be right. Lower saves time. Swept on 70 % covered:
-// 89.2 % right from 0.6 and 0.7 to none at all, as in all other bands; without kComplete, a frame
-// in full view takes 1.5 to 1.9 times as long.
+// Inlier ratio from which nothing hides the pattern and no further hypothesis is tried. Lower saves
+// time.
 constexpr double kUnoccluded = 0.85;
+// Inlier ratio from which the mirror image is not tried. Without it, frames in full view take
+// longer.
 constexpr double kComplete = 0.95;
-// Frame pixels by which features lie beside a plane, at least and at most, and how many bend it: a
-// number, and a share of its own. Of 216 flat prints, half and more covered, none had more than 16;
-// of 5 bent ones that nothing else gave away, 4 had 22 to 45.
+// Frame pixels off a plane from which features show a bend. Lower counts noise.
 constexpr double kBesideLeast = 8.0;
+// Frame pixels off a plane up to which features show a bend. Higher counts clutter.
 constexpr double kBesideMost = 60.0;
+// Features off the plane that show a bend. Flat prints had at most 16.
 constexpr int kBesideCount = 20;
+// The same as a share (1 / n) of the plane's own features.
 constexpr int kBesideShare = 8;
-// A plane map replaces the best pose if it correlates in so many percent more, and with so many
-// inliers: it has two parameters more to bend. Swept on 70 % covered: 89.2 % right with 10 to 40,
-// and with 8 to 32.
+// Percent of the cells by which a plane map must exceed the best pose, since it has two more
+// parameters. [10, 40] tuned: pose
 constexpr int kMapGain = 20;
+// Inliers that a plane map needs. [8, 32] tuned: pose
 constexpr int kMapInliers = 16;
 
-// Of many patterns, those are matched in full that at least kMinVotes features vote for (of the
-// votes that chance casts two agree; with four, tilts of 75 to 80 degrees went from 38 to 35 %),
-// and not fewer than a kShadowRatio-th of the votes for another pattern at the same place: what
-// shares a frame or a logo with it. Of 50 patterns, that removed one false name in a hundred
-// frames. kMargin widens a place by a quarter of the pattern: one vote places it that well.
+// Votes from which a pattern of many is matched in full. Higher loses tilted patterns, lower takes
+// time; chance casts two.
 constexpr std::uint16_t kMinVotes = 3;
+// Share (1 / n) of another pattern's votes at the same place below which a pattern is skipped.
+// Higher accepts prints that share a frame or logo.
 constexpr int kShadowRatio = 6;
+// Share of the pattern by which a place is widened: the accuracy of one vote.
 constexpr double kMargin = 0.25;
-// At most so many of them a frame, and if none is found, so many by votes alone, then in all with
-// the one whose turn it is: each costs the time of a match in full. By hand.
+// Patterns matched in full per frame. More find patterns sooner; each costs a match in full. Not
+// measured.
 constexpr std::ptrdiff_t kMaxLikely = 4;
+// Patterns matched by votes alone if none is likely. Not measured.
 constexpr std::size_t kGuesses = 2;
+// Patterns matched in all, the one whose turn it is included. Not measured.
 constexpr std::size_t kMatched = 3;
 
 constexpr std::int64_t kLeastWork = 500'000;  // of a slice, or a search would never end
@@ -82,7 +79,7 @@ std::size_t max_codes(std::span<const TrackedPattern> patterns) {
   return most;
 }
 
-/// Whether `other` lies within the outline that a pattern has by one vote, with a margin.
+/// Whether `other` is within the outline that a pattern has by one vote, with a margin.
 bool covers(const TrackedPattern& pattern, const FeatureMatch& place, const FeatureMatch& other) {
   const glm::dvec2 size(pattern.width(), pattern.height());
   const glm::dvec2 at =
@@ -204,7 +201,7 @@ bool PatternSearch::advance(std::int64_t work) {
   }
 }
 
-/// Extracts features; false if there are none.
+/// Extracts features; false if none exists.
 bool PatternSearch::take_features(std::int64_t& work) {
   if (!extractor_->extend(work)) return true;
   const bool any = !extractor_->found().empty();
@@ -219,7 +216,7 @@ bool PatternSearch::take_features(std::int64_t& work) {
   return any;
 }
 
-/// The next step of a search; false if there is none.
+/// The next step of a search; false if none exists.
 bool PatternSearch::step(std::int64_t& work) {
   LapClock clock;
   TrackTimes& times = candidates_->times;
@@ -293,7 +290,8 @@ void PatternSearch::take_hypotheses() {
 void PatternSearch::start_hypothesis(const TrackedPattern& pattern, const FrameView& frame) {
   DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
   // Among all votes of the spare features some agree by chance in any picture.
-  const bool chance = features_ == Features::kSpare && hypotheses_[hypothesis_].inliers < kVouching;
+  const bool chance =
+      features_ == Features::kSpare && hypotheses_[hypothesis_].inliers < kConfirmingFeatures;
   if (candidate.reason == Reason::kNoGeometry && !chance) {
     candidate.reason = Reason::kFailedVerification;
   }
@@ -347,7 +345,7 @@ void PatternSearch::conclude(const TrackedPattern& pattern, const FrameView& fra
   features_ = Features::kHalf;
 }
 
-/// Goes on with the next hypothesis if it may be better than what was found.
+/// Continues the next hypothesis if it may exceed the best so far.
 void PatternSearch::next_hypothesis() {
   const DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
   stage_ = Stage::kMap;
@@ -377,13 +375,13 @@ PatternSearch::PoseCandidate PatternSearch::evaluate_start(const TrackedPattern&
   out.complete = out.finest && fit.inlier_ratio() >= kComplete;
   out.few = fit.inliers * 5 < fit.visible;
   out.close = fit.close >= kClosePatches;
-  out.restless = known_camera_ && fit.restless();
+  out.inconsistent = known_camera_ && fit.inconsistent();
   // Of two places that show as many cells, the finest level's patches tell the better one.
   out.score = static_cast<int>(out.finest ? 0.5 * out.percent +
                                                 100.0 * (fit.inlier_ratio() + fit.correlation)
                                           : out.percent + 50.0 * fit.correlation);
   // Only where there is nothing else.
-  if (out.restless) out.score = out.score / kRestlessShare;
+  if (out.inconsistent) out.score = out.score / kInconsistentDivisor;
   return out;
 }
 
@@ -401,7 +399,7 @@ PatternSearch::PoseCandidate PatternSearch::refine_start(const TrackedPattern& p
     const double after = reprojection_rms(camera_, now.pose, points);
     if (after > kWrongRms * (before + 1.0)) now.score = 0;
     if (radius == SearchRadius::kNear || now.score > best.score) best = now;
-    if (best.finest && !best.restless) break;
+    if (best.finest && !best.inconsistent) break;
   }
   const bool boxed = best.refined && !pattern.surface.faces().empty();
   return boxed ? ask_other_faces(pattern, frame, best) : best;
@@ -412,9 +410,8 @@ PatternSearch::PoseCandidate PatternSearch::refine_start(const TrackedPattern& p
 PatternSearch::PoseCandidate PatternSearch::ask_other_faces(const TrackedPattern& pattern,
                                                             const FrameView& frame,
                                                             const PoseCandidate& one) const {
-  // Of 192 frames of boxes (`modar-lab bench pose --shape`), 9 and 62 pixels beside without this:
-  // two, with it none; of 192 of roughly cut ones, 47 pixels: one, with it none.
-  // Lower lets noise decide between two equal images; not swept.
+  // Cells by which one mirror image must exceed the other. Lower lets noise decide between two
+  // equal images. Not swept.
   constexpr int kMoreCells = 3;
   const auto cells_at = [&](const Pose& pose) {
     return check_photometry(pattern, map_of_pose(pattern, camera_, pose), frame.pyramid);
@@ -429,21 +426,22 @@ PatternSearch::PoseCandidate PatternSearch::ask_other_faces(const TrackedPattern
   return better ? other : one;
 }
 
-bool PatternSearch::vouched() const {
-  return hypotheses_[hypothesis_].inliers >= kVouching && least_rms_ <= kVouchedRms;
+bool PatternSearch::has_enough_inliers() const {
+  return hypotheses_[hypothesis_].inliers >= kConfirmingFeatures && least_rms_ <= kConfirmedRms;
 }
 
-bool PatternSearch::convinces(const TrackedPattern& pattern, const FrameView& frame,
-                              const PoseCandidate& one) const {
-  if (features_ == Features::kSpare && one.percent < kSparePercent && !vouched()) return false;
-  if (one.finest && vouched() && !one.few) return one.percent >= kVouchedPercent;
+bool PatternSearch::passes_verification(const TrackedPattern& pattern, const FrameView& frame,
+                                        const PoseCandidate& one) const {
+  if (features_ == Features::kSpare && one.percent < kSparePercent && !has_enough_inliers())
+    return false;
+  if (one.finest && has_enough_inliers() && !one.few) return one.percent >= kConfirmedPercent;
   if (one.finest) return one.percent >= (one.close ? kClosePatchesPercent : kMinPercent);
-  return one.percent >= (vouched() ? kMinPercent : kVaguePercent) &&
+  return one.percent >= (has_enough_inliers() ? kMinPercent : kVaguePercent) &&
          reprojection_rms(camera_, one.pose, matcher_.inliers()) <= kVagueRms &&
          photometric_percent(pattern, frame, one.pose, kVagueCells) > 0;
 }
 
-/// Whether many features continue the place that was found, but beside its plane.
+/// Whether many features continue the place that was found, but off its plane.
 bool PatternSearch::bent(const TrackedPattern& pattern) const {
   if (!pattern.surface.flat() || best_.unoccluded || best_.score == 0) return false;
   const HomographyHypothesis& found = hypotheses_[best_hypothesis_];
@@ -455,7 +453,7 @@ bool PatternSearch::bent(const TrackedPattern& pattern) const {
 void PatternSearch::consider(const TrackedPattern& pattern, const FrameView& frame,
                              const PoseCandidate& one) {
   std::array<glm::dvec2, 4> corners;
-  if (one.score <= best_.score || !convinces(pattern, frame, one) ||
+  if (one.score <= best_.score || !passes_verification(pattern, frame, one) ||
       !locate_corners(pattern, map_of_pose(pattern, camera_, one.pose), corners)) {
     return;
   }
@@ -464,7 +462,7 @@ void PatternSearch::consider(const TrackedPattern& pattern, const FrameView& fra
   DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
   candidate.reason = Reason::kVisible;
   candidate.pose = one.pose;
-  candidate.restless = one.restless;
+  candidate.inconsistent = one.inconsistent;
   candidate.inliers = hypotheses_[hypothesis_].inliers;
 }
 
@@ -541,7 +539,7 @@ bool SlicedDetector::advance(std::int64_t work, DetectionCandidates& candidates,
   if (!busy_) return false;
   if (!finished_) {
     finished_ = job_.search.advance(work);
-    return false;  // bringing a find to the present frame costs too much to do both
+    return false;  // moving a find to the present frame costs too much to do both
   }
   std::swap(candidates, job_.found);
   priorities.swap(job_.priorities);

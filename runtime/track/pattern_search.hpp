@@ -25,7 +25,7 @@ enum class SearchPriority : std::uint8_t {
 };
 
 /// Percentage of the cells that must correlate where kClosePatches speak for a place: with 20,
-/// strips of a seventh gave poses 200 pixels beside.
+/// strips of a seventh gave poses 200 pixels off.
 inline constexpr int kClosePatchesPercent = 25;
 
 /// What a search found of one pattern.
@@ -34,7 +34,7 @@ struct DetectionCandidate {
   Pose pose;                     ///< if kVisible
   bool homography_only = false;  ///< no pose explains the frame, but `map` does; `pose` is nearest
   PlaneMap map;                  ///< if homography_only
-  bool restless = false;         ///< see PatchFit::restless()
+  bool inconsistent = false;     ///< see PatchFit::inconsistent()
   int matches = 0;
   int inliers = 0;
 };
@@ -94,15 +94,15 @@ class PatternSearch {
   /// A refined pose and the evidence for it.
   struct PoseCandidate {
     Pose pose;
-    int percent = 0;          ///< of the textured cells in view that correlate
-    int score = 0;            ///< ranks candidates
-    bool refined = false;     ///< the patches fit,
-    bool finest = false;      ///< on the finest level,
-    bool unoccluded = false;  ///< most of them,
-    bool complete = false;    ///< nearly all
-    bool few = false;         ///< less than a fifth of them
-    bool close = false;       ///< kClosePatches closely
-    bool restless = false;    ///< they contradict each other
+    int percent = 0;            ///< of the textured cells in view that correlate
+    int score = 0;              ///< ranks candidates
+    bool refined = false;       ///< the patches fit,
+    bool finest = false;        ///< on the finest level,
+    bool unoccluded = false;    ///< most of them,
+    bool complete = false;      ///< nearly all
+    bool few = false;           ///< less than a fifth of them
+    bool close = false;         ///< kClosePatches closely
+    bool inconsistent = false;  ///< they contradict each other
   };
   [[nodiscard]] PoseCandidate evaluate_start(const TrackedPattern& pattern, const FrameView& frame,
                                              SearchRadius radius, const Pose& start) const;
@@ -111,10 +111,10 @@ class PatternSearch {
   [[nodiscard]] PoseCandidate ask_other_faces(const TrackedPattern& pattern, const FrameView& frame,
                                               const PoseCandidate& one) const;
   /// Whether the features of the hypothesis speak for it by themselves.
-  [[nodiscard]] bool vouched() const;
+  [[nodiscard]] bool has_enough_inliers() const;
   [[nodiscard]] bool bent(const TrackedPattern& pattern) const;
-  bool convinces(const TrackedPattern& pattern, const FrameView& frame,
-                 const PoseCandidate& one) const;
+  bool passes_verification(const TrackedPattern& pattern, const FrameView& frame,
+                           const PoseCandidate& one) const;
   void consider(const TrackedPattern& pattern, const FrameView& frame, const PoseCandidate& one);
   [[nodiscard]] bool likely(std::size_t start) const;
   void fit_starts(const TrackedPattern& pattern, const FrameView& frame);
@@ -180,7 +180,7 @@ class SlicedDetector {
   [[nodiscard]] bool idle() const { return prepared_ && !busy_; }
   /// Starts a search; only if idle().
   void start(const GrayImage& frame, std::span<const SearchPriority> priorities);
-  /// Goes on with it (PatternSearch::advance), or prepares for the first. In the call after the one
+  /// Continues it (PatternSearch::advance), or prepares for the first. In the call after the one
   /// that finished it, swaps out candidates and priorities, and returns true.
   bool advance(std::int64_t work, DetectionCandidates& candidates,
                std::vector<SearchPriority>& priorities);
@@ -210,7 +210,7 @@ class AsyncDetector {
   [[nodiscard]] bool idle() const { return stage_.load(std::memory_order_acquire) == Stage::kIdle; }
   /// Starts a search; only if idle(). priorities: one per pattern.
   void start(const GrayImage& frame, std::span<const SearchPriority> priorities);
-  /// Swaps out the candidates and priorities of a finished search; false if there is none.
+  /// Swaps out the candidates and priorities of a finished search; false if none exists.
   bool take(DetectionCandidates& candidates, std::vector<SearchPriority>& priorities);
 
  private:

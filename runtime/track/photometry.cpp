@@ -7,7 +7,7 @@
 namespace modar::tracker {
 namespace {
 
-/// A picture as samples so many pixels apart see it: between two levels of its pyramid, as textures
+/// A picture as seen by samples at this distance: between two levels of its pyramid, as textures
 /// are filtered (Williams, "Pyramidal parametrics", 1983). The nearest level alone showed regular
 /// print that is finer than the samples differently on each side of a comparison.
 class Filtered {
@@ -40,17 +40,16 @@ class Filtered {
   float share_ = 0;
 };
 
-// Cells along a side of a box's face. With cells over the whole picture, most of them lay on two
-// faces or on hidden ones: a face seen alone had five, and was never believed.
+// Cells along a side of a box's face. Fewer per face never confirm a face that is seen alone.
 constexpr int kFaceCellSide = 4;
 constexpr int kFaceCells = kFaceCellSide * kFaceCellSide;
 
-// A pattern is regular if this share of its cells, of so many at least, agree with what lies a
-// shift beside them, of less than so many samples of 48. Trades prints that are asked for their
-// details for others that are mistaken in a grid: of `modar-lab bench clutter`'s prints the
-// chessboards, keyboards, grids, tables and wallpapers are, and of twelve pictures none.
+// Share of a pattern's cells that agree with a shifted copy, from which it is regular. Lower
+// examines the details of more prints, higher confuses grids.
 constexpr double kRegularShare = 0.6;
+// Cells that must agree for that, at least.
 constexpr int kLeastShifted = 12;
+// Samples of the longest shift that is tried, of 48.
 constexpr int kMostShift = 33;
 
 int cells_of(const TrackedPattern& pattern) {
@@ -67,7 +66,7 @@ double step_of(const TrackedPattern& pattern, int side) {
   return std::max(pattern.width(), pattern.height()) / static_cast<double>(side * kCellSamples);
 }
 
-/// Where a sample of a cell lies, in shares of width and height, of `side` by `side` cells.
+/// The place of a sample of a cell, in shares of width and height, of `side` by `side` cells.
 glm::dvec2 share_at(int cell, int k, int side) {
   return {
       (cell % side * kCellSamples + k % kCellSamples + 0.5) / (side * kCellSamples),
@@ -75,8 +74,8 @@ glm::dvec2 share_at(int cell, int k, int side) {
           (side * kCellSamples)};
 }
 
-/// The same of a pattern's cell. Those of a box lie face by face and are not mirrored: what lies
-/// beside a face in the picture is another one.
+/// The same of a pattern's cell. Those of a box are ordered by face and not mirrored: the neighbour
+/// of a face in the picture is another one.
 glm::dvec2 place_of(const TrackedPattern& pattern, int cell, int k, const Mirror* mirror,
                     int side) {
   if (!pattern.surface.faces().empty()) {
@@ -230,8 +229,8 @@ PatternSamples rows_of(const TrackedPattern& pattern, bool upright) {
   return rows;
 }
 
-/// The cell whose rows of samples begin at `own`, compared with what begins at `other` and goes on
-/// in steps of 1, or of -1 in a mirror.
+/// The cell whose rows of samples begin at `own`, compared with what begins at `other` and
+/// continues in steps of 1, or of -1 in a mirror.
 CellMatch compare_rows(const float* own, const float* other, int step) {
   CellSamples here{};
   CellSamples there{};
@@ -248,10 +247,10 @@ CellMatch compare_rows(const float* own, const float* other, int step) {
 
 Mirror most_alike_mirror(const TrackedPattern& pattern, bool upright,
                          const std::array<bool, kCells>& those) {
-  // Turned so that the mirror swaps what lies along a row.
+  // Turned so that the mirror swaps cells along a row.
   const PatternSamples rows = rows_of(pattern, upright);
   // Mirrors at the samples and half-way between, from the middle outwards: of equally good ones the
-  // first. Cells behind the mirror are compared with what lies before it.
+  // first. Cells behind the mirror are compared with those before it.
   int best = kPatternSide;
   int most = 0;
   for (int i = 0; i < 2 * (kPatternSide - kCellSamples); ++i) {

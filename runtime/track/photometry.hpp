@@ -13,26 +13,27 @@
 namespace modar::tracker {
 
 /// 8x8 cells of 6x6 samples: smaller cells agree by chance, larger ones are hidden in part too
-/// often. By hand.
+/// often.
 inline constexpr int kCellSide = 8;
 inline constexpr int kCells = kCellSide * kCellSide;
 inline constexpr int kCellSamples = 6;
 using CellSamples = std::array<float, kCellSamples * kCellSamples>;
 
-/// Contrast is a variance: below it a cell of the pattern shows nothing. And the correlation from
-/// which a cell agrees, and below which it disagrees; what lies between says nothing. Swept on 70 %
-/// covered: 89.2 % right with a contrast of 8 to 32; 85.8, 89.2 and 83.3 % where cells agree from
-/// 0.35, 0.5 and 0.7.
+/// Variance below which a cell of the pattern shows nothing. Lower compares noise. [8, 32] tuned:
+/// pose
 inline constexpr float kTexturedCell = 16.0f;
+// Correlation from which a cell agrees. Lower accepts clutter, higher loses blurred prints. [0.35,
+// 0.7] tuned: pose
 inline constexpr float kAgreeingCell = 0.5f;
+// Correlation below which a cell disagrees; values between say nothing.
 inline constexpr float kDisagreeingCell = 0.3f;
 
 /// Correlation between earlier and current contents of a cell: from kSamePrint on they are the
 /// same, below kChanged they differ.
 inline constexpr float kSamePrint = 0.7f;
 inline constexpr float kChanged = 0.5f;
-/// Cosine of the smallest angle (six degrees) between two directions from which an object above the
-/// paper covers different places: half a cell apart at a height of half the print's longer side.
+/// Cosine of the least angle between two views in which an object above the paper covers different
+/// cells.
 inline constexpr float kElsewhere = 0.9945f;
 
 /// A line in which a print's mirror image swaps its sides: u becomes 2 at - u, of the share u of
@@ -40,7 +41,7 @@ inline constexpr float kElsewhere = 0.9945f;
 struct Mirror {
   bool upright = true;
   double at = 0.5;
-  /// Whether the mirror image of a cell lies in the outline, as its centre tells.
+  /// Whether the centre of a cell's mirror image is in the outline.
   [[nodiscard]] bool keeps(int cell) const;
   /// Pixels of the pattern's image to those of its mirror image.
   [[nodiscard]] glm::dmat3 pixels_of(const TrackedPattern& pattern) const;
@@ -52,8 +53,8 @@ class CellGrid {
   /// The arguments must outlive it. side: cells along a side of a flat pattern.
   CellGrid(const TrackedPattern& pattern, const PlaneMap& map, std::span<const GrayImage> pyramid,
            int side = kCellSide);
-  /// What the frame shows of a cell, of its mirror image if there is one, which may lie beside the
-  /// outline; false if that does not lie in the frame.
+  /// Samples of a cell in the frame, and of its mirror image if there is one, which may be outside
+  /// the outline; false if that is not in the frame.
   bool see(int cell, CellSamples& seen, const Mirror* mirror = nullptr) const;
   /// How many times less the frame resolves than the samples of a cell could, 1 or more.
   [[nodiscard]] double spread() const { return spread_; }
@@ -82,7 +83,7 @@ struct CellMatch {
 };
 CellMatch compare(const CellSamples& expected, const CellSamples& seen);
 
-/// Textured cells of the pattern that lie in the frame, and how many of them correlate.
+/// Textured cells of the pattern in the frame, and how many of them correlate.
 struct PhotometricCheck {
   int cells = 0;
   int matching = 0;

@@ -12,9 +12,8 @@
 namespace modar::tracker {
 namespace {
 
-// Square pixels of a plausible outline. Smaller ones cannot hold the patches of a pyramid level;
-// it trades the farthest distance for outlines of a few pixels that clutter can imitate. 150 to 600
-// change no pose of `modar-lab bench wild`.
+// Square pixels of a plausible outline. Smaller finds farther patterns and accepts clutter. [150,
+// 600] tuned: wild
 constexpr double kMinArea = 300.0;
 
 /// Square pixels; positive for corners in clockwise order on the screen.
@@ -178,7 +177,7 @@ bool locate_corners(const TrackedPattern& pattern, const PlaneMap& map,
                     std::array<glm::dvec2, 4>& corners) {
   if (!map_corners(pattern, map, corners)) return false;
   if (map.surface == nullptr) return plausible(corners);
-  constexpr int kLeast = 6;  // of the grid's places
+  constexpr int kMinPlaces = 6;  // of the grid's places
   const double cell = 1.0 * pattern.width() * pattern.height() / (kGrid * kGrid);
   int count = 0;
   double area = 0.0;
@@ -187,7 +186,7 @@ bool locate_corners(const TrackedPattern& pattern, const PlaneMap& map,
     area += cell * scale * scale;
     ++count;
   });
-  return count >= kLeast && area > kMinArea;
+  return count >= kMinPlaces && area > kMinArea;
 }
 
 std::array<glm::dvec2, 4> claimed_place(const TrackedPattern& pattern, const PlaneMap& map,
@@ -320,14 +319,15 @@ Pose extrapolate(const Pose& previous, const Pose& now) {
 }
 
 bool in_view(const TrackedPattern& pattern, const PlaneMap& map, const Camera& camera) {
-  constexpr int kSide = 5;
+  constexpr int kGridSide = 5;
   constexpr int kMinInside = 4;  // of 25: names the reason of a loss only
   int inside = 0;
-  for (int i = 0; i < kSide * kSide; ++i) {
+  for (int i = 0; i < kGridSide * kGridSide; ++i) {
     bool in_front = false;
-    const glm::dvec2 p = map.at({(i % kSide + 0.5) / kSide * pattern.width(),
-                                 (static_cast<int>(i / kSide) + 0.5) / kSide * pattern.height()},
-                                in_front);
+    const glm::dvec2 p =
+        map.at({(i % kGridSide + 0.5) / kGridSide * pattern.width(),
+                (static_cast<int>(i / kGridSide) + 0.5) / kGridSide * pattern.height()},
+               in_front);
     inside += in_front && p.x >= 0 && p.y >= 0 && p.x < camera.width && p.y < camera.height ? 1 : 0;
   }
   return inside >= kMinInside;

@@ -42,9 +42,9 @@ struct PlaneMap {
   glm::dvec3 shift{};                       ///< this is added
   glm::dvec3 eye{};                         ///< the camera, pattern axes
 
-  /// Frame pixel of a pattern pixel; `in_front` is false where the point lies behind the camera, or
-  /// where a curved pattern turns away from it. mean_square: of the distances of what lies around
-  /// the pixel; a curved pattern bends away by half of it, as the best plane through them does.
+  /// Frame pixel of a pattern pixel; `in_front` is false where the point is behind the camera, or
+  /// where a curved pattern turns away from it. mean_square: of the distances around the pixel; a
+  /// curved pattern bends away by half of it, as the best plane through them does.
   [[nodiscard]] glm::dvec2 at(glm::dvec2 pixel, bool& in_front, double mean_square = 0) const;
   /// The same of places that are turned away, too.
   [[nodiscard]] glm::dvec2 anywhere(glm::dvec2 pixel, bool& in_front) const;
@@ -61,7 +61,7 @@ PlaneMap map_of_pose(const TrackedPattern& pattern, const Camera& camera, const 
 /// Frame pixels of a pattern's pixel, in the middle of what shows.
 double scale_of(const TrackedPattern& pattern, const PlaneMap& map);
 
-/// The pattern's corners in the order of Detection; false if one lies behind the camera.
+/// The pattern's corners in the order of Detection; false if one is behind the camera.
 bool map_corners(const TrackedPattern& pattern, const PlaneMap& map,
                  std::array<glm::dvec2, 4>& corners);
 
@@ -92,11 +92,11 @@ int fit_poses(const TrackedPattern& pattern, const Camera& camera, const glm::dm
 /// The other pose that few points of a plane do not tell from this one.
 Pose mirrored(const Pose& pose);
 
-/// The camera pose closest to a map; none if the plane does not lie in front of the camera.
+/// The camera pose closest to a map; none if the plane is not in front of the camera.
 std::optional<Pose> nearest_pose(const TrackedPattern& pattern, const Camera& camera,
                                  const PlaneMap& map);
 
-/// A map of a flat pattern as a pose and what the pattern's plane is beside its picture
+/// A map of a flat pattern as a pose and the pattern's plane relative to its picture
 /// (TrackedPattern::shape): exactly the map, by the rotation that needs the least of a shape (polar
 /// decomposition). aspect: the area that the shape gives the picture. None if no camera could see
 /// it, or the shape would be off by more than a quarter.
@@ -107,7 +107,7 @@ struct PlaneSplit {
 std::optional<PlaneSplit> split_map(const TrackedPattern& pattern, const Camera& camera,
                                     const PlaneMap& map, double aspect);
 
-/// The rotation that a nearly orthonormal matrix stands for: the rounding error of a pose that is
+/// The rotation nearest to a nearly orthonormal matrix: the rounding error of a pose that is
 /// fed back every frame doubles each time otherwise.
 glm::dmat3 orthonormal(const glm::dmat3& rotation);
 

@@ -41,10 +41,10 @@ glm::dmat3 to_glm(const Eigen::Matrix3d& m) {
 
 tl::unexpected<Error> degenerate(const char* cause) {
   return fail(ExitCode::kInvalidInput, "pose.degenerate", "", cause,
-              "give four corners of which no three lie on a line");
+              "give four corners of which no three are on a line");
 }
 
-/// Similarity that brings four points to mean 0 and mean distance 1; false where it cannot.
+/// Similarity that normalises four points to mean 0 and mean distance 1; false where it cannot.
 bool normalisation(std::span<const glm::dvec2, 4> points, Eigen::Matrix3d& similarity) {
   glm::dvec2 mean(0.0);
   for (const glm::dvec2& p : points) mean += 0.25 * p;
@@ -245,7 +245,7 @@ Result<glm::dmat3> homography_from_points(std::span<const glm::dvec2, 4> from,
   Eigen::Matrix3d basis_to;
   if (!basis_to_points(from, normal_from, basis_from) ||
       !basis_to_points(to, normal_to, basis_to)) {
-    return degenerate("three of the points lie on a line");
+    return degenerate("three of the points are on a line");
   }
   Eigen::Matrix3d h = normal_to.inverse() * basis_to * basis_from.inverse() * normal_from;
   h /= h.norm();
@@ -268,7 +268,7 @@ Result<Pose> pose_from_homography(const Camera& camera, const glm::dmat3& homogr
   if (m(2, 2) < 0.0) lambda = -lambda;
   m *= lambda;
   if (!m.allFinite() || !(m(2, 2) > 0.0))
-    return degenerate("the pattern does not lie before the camera");
+    return degenerate("the pattern is not in front of the camera");
   const Eigen::Vector3d r3 = m.col(0).cross(m.col(1));
   const double second = m.col(1).norm();
   if (!(r3.norm() > kDegenerateAngle * second) || !(second > kDegenerateAngle)) {

@@ -1,4 +1,5 @@
-// The states of the loop: search for patterns, track those found, give the reason if there is none.
+// The states of the loop: search for patterns, track those found, give the reason if a pattern is
+// lost.
 #include "modar/pose_loop.hpp"
 
 #include <algorithm>
@@ -24,18 +25,18 @@ using tracker::PrintVerifier;
 using tracker::Track;
 using tracker::TrackedPattern;
 
-// When to test whether a pose has slipped off its pattern: if the prediction missed by this many
-// pixels, unless at least kSurePatches patches fit, and kSurePercent of those in view. A pattern
-// that is found again within kRemembered frames of its loss is tested as well. Testing more often
-// costs time (it compares all cells) and rejects finds in pictures that have become less sharp;
-// testing less often shows wrong poses. Not measured.
-constexpr double kSlippingSurprise = 2.5;
+// Pixels of the prediction's error from which a pose is tested for a slip. Lower takes time and
+// rejects blurred finds, higher shows wrong poses.
+constexpr double kSlippingError = 2.5;
+// Patches that must fit for a pose to need no such test.
 constexpr int kSurePatches = 30;
+// Percent of the patches in view that must fit for that.
 constexpr int kSurePercent = 95;
-constexpr int kRemembered = 10;
-// Frames in a row whose patches contradict each other (PatchFit::restless()) until a pattern is
+// Frames after a loss in which a pattern found again is tested for a slip.
+constexpr int kRefoundFrames = 10;
+// Frames in a row whose patches contradict each other (PatchFit::inconsistent()) until a pattern is
 // searched for anew; a wrong pose is shown no longer.
-constexpr int kMostRestless = 2;
+constexpr int kMaxInconsistent = 2;
 
 }  // namespace
 
@@ -51,7 +52,7 @@ struct PoseLoop::State {
   std::unique_ptr<tracker::SearchScheduler> search;
   std::unique_ptr<PrintVerifier> print_verifier;
   std::unique_ptr<tracker::SelfCalibration> calibration;  ///< if the camera is a guess
-  std::unique_ptr<tracker::ExtendedTracking> extended;    ///< if it was asked for
+  std::unique_ptr<tracker::ExtendedTracking> extended;    ///< if it was requested
   std::optional<glm::dvec3> turn;  ///< of what the camera sees, since the last frame
 
   void step(const GrayImage& frame, TrackResult& result);
@@ -175,7 +176,7 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
             [](const Detection& a, const Detection& b) { return a.pattern < b.pattern; });
 }
 
-/// Goes on with the camera that the frames so far say.
+/// Continues with the camera estimated from the frames so far.
 void PoseLoop::State::calibrate() {
   const bool moved = calibration->apply();
   search->set_shapes(camera, [this](std::size_t i) { return calibration->aspect(i); });
@@ -193,12 +194,13 @@ void PoseLoop::State::track_all(TrackResult& result) {
     track.tracked = options.track && frame_tracker.update(patterns[i], track, detection);
     const bool sure = detection.inliers >= kSurePatches &&
                       detection.inliers * 100 >= detection.matches * kSurePercent;
-    if (track.tracked && !sure && track.surprise >= kSlippingSurprise && has_slipped(i, track)) {
+    if (track.tracked && !sure && track.prediction_error >= kSlippingError &&
+        has_slipped(i, track)) {
       track.tracked = track.has_motion = false;
       track.last_reason = Reason::kLostByBlur;
     }
-    const bool restless = calibration == nullptr && track.restless > kMostRestless;
-    if (track.tracked && (restless || !measure(i, detection))) {
+    const bool inconsistent = calibration == nullptr && track.inconsistent > kMaxInconsistent;
+    if (track.tracked && (inconsistent || !measure(i, detection))) {
       track.tracked = track.has_motion = false;
       track.last_reason = Reason::kFailedVerification;
     }
@@ -274,7 +276,7 @@ bool PoseLoop::State::switch_pattern(std::size_t from, std::size_t to, Detection
 /// Starts a track; false if the candidate is not visible in the current frame.
 bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
                                   const DetectionCandidate& candidate, Detection& detection) const {
-  if (candidate.restless) return false;
+  if (candidate.inconsistent) return false;
   Track next;
   next.pose = candidate.pose;
   next.homography_only = candidate.homography_only;
@@ -292,7 +294,7 @@ bool PoseLoop::State::start_track(const TrackedPattern& pattern, Track& track,
                   tracker::photometric_percent(pattern, frame_tracker.frame(), next.pose) >=
                       (fit.close >= tracker::kClosePatches ? tracker::kClosePatchesPercent
                                                            : tracker::kMinPercent);
-    if (!here || (calibration == nullptr && fit.restless())) return false;
+    if (!here || (calibration == nullptr && fit.inconsistent())) return false;
   }
   if (!frame_tracker.locate(pattern, next, detection)) return false;
   next.tracked = true;
@@ -354,7 +356,7 @@ void PoseLoop::State::accept(TrackResult& result) {
                 start_track(patterns[i], track, candidate, detection);
     if (here) {
       track.verified = search->verifies_finds();
-      const bool slipped = before.verified && before.frames_since_lost < kRemembered &&
+      const bool slipped = before.verified && before.frames_since_lost < kRefoundFrames &&
                            print_verifier->has_slipped(i, frame_tracker.frame(), track);
       here = !slipped && (!track.verified || measure(i, detection));
       if (!here) track = before;

@@ -22,9 +22,8 @@ int photometric_percent(const TrackedPattern& pattern, const FrameView& frame, c
 
 int map_photometric_percent(const TrackedPattern& pattern, const FrameView& frame,
                             const PlaneMap& map) {
-  // A map has two parameters more than a pose to bend to what it sees. Swept on 70 % covered: with
-  // 25, 50 and 75, 93.3, 90.8 and 90.8 % of the frames are recognised, and 86.7, 89.2 and 89.2 %
-  // right.
+  // Percent of the cells for a map, which has two more parameters than a pose. Lower finds more and
+  // more wrong ones. [25, 75] tuned: pose
   constexpr int kMinMapPercent = 50;
   const PhotometricCheck check = check_photometry(pattern, map, frame.pyramid);
   if (check.matching < 2 * kMinCells) return 0;
@@ -36,16 +35,14 @@ int map_photometric_percent(const TrackedPattern& pattern, const FrameView& fram
 
 namespace {
 
-// Side of the pattern on the coarsest level that refinement starts on, pixels: smaller images hold
-// no patches. Swept on area 0.02-0.05: flat from 12 to 48.
+// Side of the pattern, pixels, on the coarsest level of refinement. Smaller images hold no patches.
+// [12, 48] tuned: pose
 constexpr double kMinSide = 24.0;
 // Ratio of distances between frames; larger changes are patches that slid to other texture. Swept
 // on tracking fast: flat from 1.15 to 1.7.
 constexpr double kMaxZoom = 1.35;
-// Share of a coarser level's inlier ratio that a finer one must keep: under blur its patches fit
-// along the motion only, and draw the pose away from what coarse ones found. Swept on tracking
-// fast: corners are 0.56, 0.59 and 0.66 pixels off with 0.6, 0.85 and 0.95, and jump by 0.57, 0.57
-// and 0.47.
+// Share of a coarser level's inlier ratio that a finer one must keep. Lower follows motion blur,
+// higher gives up accuracy. [0.6, 0.95] tuned: pose
 constexpr double kMinKept = 0.85;
 // Gauss-Newton steps of a level for a pose, and for a map.
 constexpr int kSteps = 10;
@@ -86,7 +83,7 @@ bool refine(const TrackedPattern& pattern, const FrameView& frame, SearchRadius 
         align(pattern, frame, level, kSteps, precise && level == best.frame_level, next);
     const double zoom = next.translation.z / depth;
     if (!(zoom < kMaxZoom && zoom * kMaxZoom > 1.0)) return false;
-    // Coarse levels have few patches, of which chance brings more.
+    // Coarse levels have few patches, more of them by chance.
     const bool finest_level = level == best.frame_level;
     const bool enough = finest_level || now.inliers * 5 >= now.visible;
     if (enough && now.good() && (!found || now.inlier_ratio() >= kMinKept * fit.inlier_ratio())) {
@@ -117,7 +114,7 @@ bool refine_map(const TrackedPattern& pattern, const FrameView& frame, PlaneMap&
 }
 
 bool refine_plane(TrackedPattern& pattern, const FrameView& frame, Pose& pose, PatchFit& fit) {
-  // Of a level: a wrong focal length, or aspect, leaves a pose some pixels beside.
+  // Of a level: a wrong focal length, or aspect, leaves a pose some pixels off.
   constexpr int kPlaneSteps = 3;
   constexpr int kCoveredSteps = 10;  // most end earlier
   constexpr std::size_t kCoarse = 40;
@@ -132,12 +129,12 @@ bool refine_plane(TrackedPattern& pattern, const FrameView& frame, Pose& pose, P
                       next, change);
   }
   // A pose of the wrong camera fits a part of what shows of a covered print: of 360 covered to 70
-  // %, 76 lay 5 to 74 pixels beside. Steps over all patches spread from there over what shows.
+  // %, 76 were 5 to 74 pixels off. Steps over all patches spread from there over what shows.
   if (!fit.open()) {
     fit = align_plane(plane, frame, best.frame_level, kCoveredSteps, kMaxPatches, next, change);
   }
   if (pattern.surface.flat() && fit.inlier_ratio() < kLittleShown) {
-    fit.unrest = unrest_of(frame.patches.last_linearisations());
+    fit.residual_rms = residual_rms_of(frame.patches.last_linearisations());
   }
   if (!fit.good()) return false;
   pattern.shape = plane.shape;
@@ -154,13 +151,12 @@ constexpr std::size_t kPatches =
 constexpr int kCoarserLevels = 2;  // above the finest: predictions are good to a pixel there first
 constexpr int kPointSteps = 4;     // over features alone
 constexpr int kLevelSteps = 5;     // of a level: each lets patches further away take part
-// Template pixels to which the pose must predict a patch for it to take part, and to which a patch
-// that correlates by kMinCorrelation then measures its place. Larger predictions let patches in
-// that settle on a neighbouring edge. Half-covered patterns went from 98.3 to 100 % right by these.
-// Swept on 70 % covered, 89.2 % right now: 88.3 and 89.2 % with half and twice the first, 88.3 and
-// 87.5 % of the second; 88.3 % with 0.3 and 0.8 for the third.
+// Template pixels to which the pose must predict a patch that takes part. Larger lets patches
+// settle on neighbouring edges. [0.6, 2.4] tuned: pose
 constexpr double kMaxUncertainty = 1.2;
+// Template pixels to which a correlated patch measures its place. [0.2, 0.8] tuned: pose
 constexpr double kPatchSigma = 0.4;
+// Correlation from which a patch measures its place. [0.3, 0.8] tuned: pose
 constexpr float kMinCorrelation = 0.6f;
 constexpr double kOutlier = 3.0;  // sigmas
 constexpr double kAtRest = 0.1;   // pixels: the pose moves no more
@@ -312,13 +308,13 @@ void refine_from_inliers(const TrackedPattern& pattern, const FrameView& frame,
   pose = now;
 }
 
-// ---- What is drawn on a picture ----
+// ---- Drawing on a picture ----
 
 namespace {
 
 using Corners3 = std::array<glm::dvec3, 4>;  // of a picture, pattern axes
 
-/// Brings the pose to where it has the outline nearest to these pixels. False if a corner lies
+/// Moves the pose so that its outline is nearest to these pixels. False if a corner is
 /// behind the camera.
 bool fit_outline(const Camera& camera, const Corners3& world,
                  const std::array<glm::dvec2, 4>& pixels, Pose& pose) {
@@ -398,8 +394,8 @@ struct BentPose {
   }
 };
 
-/// The level on which the print's longer side has at most so many pixels: there patches catch what
-/// lies several frame pixels beside.
+/// The level on which the print's longer side has at most this many pixels: there patches reach
+/// several frame pixels away.
 int bend_level(const TrackedPattern& pattern, const Resolution& best, int levels, double most) {
   int level = best.frame_level;
   double side =
@@ -425,7 +421,7 @@ BendJacobian bend_jacobian(const Camera& camera, const Pose& pose, glm::dvec2 wo
 
 constexpr std::size_t kBendPatches = 96;
 
-/// A patch compared with the frame where the bent print has it; false if it does not lie there.
+/// A patch compared with the frame where the bent print has it; false if it is not there.
 /// map: of the bent print's pose.
 bool observe_bent(const TrackedPattern& pattern, const Camera& camera, const PatchView& view,
                   const PlaneMap& map, const BentPose& bent, const Patch& patch,
@@ -445,7 +441,7 @@ bool observe_bent(const TrackedPattern& pattern, const Camera& camera, const Pat
 }
 
 /// Mean correlation of the patches in view, negative ones counted as 0. observe(patch, seen): false
-/// if the patch does not lie in the frame.
+/// if the patch is not in the frame.
 template <class Observe>
 double mean_correlation(const PatchView& view, Observe&& observe) {
   double sum = 0.0;
@@ -488,8 +484,8 @@ BendGain gain_of_bend(const TrackedPattern& pattern, const FrameView& frame, int
 
 /// One Gauss-Newton step over the patches of a level; false if they determine none.
 bool step_bent(const TrackedPattern& pattern, const FrameView& frame, int level, BentPose& bent) {
-  constexpr int kLeast = 16;           // patches with
-  constexpr float kCorrelated = 0.5f;  // correlation
+  constexpr int kMinPatches = 16;  // with at least this correlation:
+  constexpr float kCorrelated = 0.5f;
   const PlaneMap map = map_of_pose(pattern, frame.camera, bent.pose);
   const PatchView view = view_of(pattern, frame, level, map, kBendPatches);
   const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
@@ -515,7 +511,7 @@ bool step_bent(const TrackedPattern& pattern, const FrameView& frame, int level,
               Eigen::Vector2d(static_cast<double>(one.ex), static_cast<double>(one.ey));
     ++count;
   }
-  if (count < kLeast) return false;
+  if (count < kMinPatches) return false;
   matrix.diagonal().array() += 1e-9 * matrix.trace();
   const Vector8 change = solve_symmetric(matrix, vector);
   if (!change.allFinite() || change.head<3>().norm() > kMaxRotation) return false;
@@ -548,13 +544,12 @@ double corners_apart(const TrackedPattern& pattern, const Camera& camera, const 
 
 double bend_of(const TrackedPattern& pattern, const FrameView& frame, const Pose& pose,
                double least) {
-  constexpr double kFlat = 0.2;  // pixels of the first step: flat prints in full view had 0.08
-  // Mean correlation that the bulges must add, on the first level and on the finer one: any step
-  // decides, since those that catch a print found 30 pixels beside its place may lose it again.
-  // Where much of a flat print is hidden, they bend what is not seen, up to 57 pixels, but add
-  // less: 0.048 at most in 420 frames, half and 70 % covered, and 0.054 in 48 out of focus. Bent
-  // prints that were shown gained 0.055 or more on the finer level (141 of 144 frames).
+  // Pixels of the first step below which a print is flat.
+  constexpr double kFlat = 0.2;
+  // Min. correlation gain for a bend. Checked after every step: steps that recover a 30 px offset
+  // may lose it again.
   constexpr double kGain = 0.055;
+  // The same on the finer level. Lower bends hidden parts of flat prints, higher misses bent ones.
   constexpr double kFineGain = 0.05;
   constexpr std::array<double, 6> kSides = {160.0, 160.0, 160.0, 320.0, 320.0, 320.0};
   const int levels = static_cast<int>(frame.pyramid.size());

@@ -11,7 +11,7 @@ namespace modar {
 namespace {
 
 // Radians per second that halve the latency: about what a hand at rest does. Lower lags less,
-// higher jitters less. By hand, as are the next two.
+// higher jitters less. Not measured; neither are the next two.
 constexpr double kHalvingSpeed = 0.05;
 // Time constant of the speed's own filter: longer reacts later, shorter takes jitter for motion.
 constexpr double kSpeedTime_s = 0.1;

@@ -9,42 +9,42 @@
 namespace modar::tracker {
 namespace {
 
-// Variance from which a cell has detail to tell, and correlation from which it shows the pattern:
-// trade small differences missed for true prints in doubt. Both by hand; `modar-lab bench pose
-// --lookalikes --only family` hides no true print with them.
+// Variance from which a cell has detail. Lower compares noise. Not swept.
 constexpr float kDetailed = 200.0f;
+// Correlation from which a detail agrees. Lower misses small differences, higher doubts true
+// prints.
 constexpr float kDetailAgrees = 0.8f;
-// Variance below which the frame shows nothing in a cell with detail; and below which it shows no
-// more than noise in a cell without any. By hand: a thumb on blank paper must not pass for blank.
+// Variance below which the frame shows nothing in a cell with detail. Lower: a thumb on paper
+// passes for blank.
 constexpr float kBlank = 9.0f;
+// Variance below which the frame shows only noise in a cell without detail.
 constexpr float kPlainSeen = 40.0f;
-// A frame may be so many times less sharp than its samples; and the correlation of a cell with
-// itself at that sharpness below which its detail is too fine to tell. Without it, a table of
-// figures was taken for another one (pose_loop_prints_test).
+// Factor by which a frame may be less sharp than its samples. Higher compares blurred details.
 constexpr double kBlur = 2.0;
+// Correlation of a cell with itself at that sharpness, below which its detail is too fine to
+// compare. Lower confuses tables of figures.
 constexpr float kCoarse = 0.9f;
 // Number of looks that must have shown the same.
 constexpr int kLooks = 3;
 constexpr std::uint32_t kDetailStride = 97;  // spreads the cells; coprime to their number
-// Printed cells from which on all that are connected with them differ, also those that are too fine
-// to tell or show nothing: letters of another title seldom fill a cell. Not beside the print's
-// edge, where a finger that lies still passes for printed (pose_loop_prints_test).
+// Printed cells from which all connected ones differ, too. Lower lets noise spread, higher misses
+// letters of another title.
 constexpr int kSurePrinted = 2;
 // Cells with detail below which their mean says nothing.
 constexpr int kLeastDetails = 12;
 // How many times less than its samples the frame may resolve.
 constexpr double kResolved = 1.01;
 
-/// Whether the half of a cell that lies at the print's edge shows the pattern, or nothing where the
-/// pattern shows nothing: then what differs in the cell does not reach in from outside. True away
-/// from the edge, false in a corner.
+/// Border cells: whether the outer half shows the pattern, or nothing where the pattern shows
+/// nothing: then what differs in the cell does not reach in from outside. True away from the edge,
+/// false in a corner.
 bool edge_agrees(int at, const CellSamples& expected, const CellSamples& seen) {
-  const int x = at % PrintDetails::kSide;
-  const int y = at / PrintDetails::kSide;
+  const int x = at % PrintDetails::kDetailSide;
+  const int y = at / PrintDetails::kDetailSide;
   const bool left = x == 0;
-  const bool right = x == PrintDetails::kSide - 1;
+  const bool right = x == PrintDetails::kDetailSide - 1;
   const bool top = y == 0;
-  const bool bottom = y == PrintDetails::kSide - 1;
+  const bool bottom = y == PrintDetails::kDetailSide - 1;
   const int sides = left + right + top + bottom;
   if (sides != 1) return sides == 0;
   // The inner half is a copy of the outer one, so that both count alike.
@@ -68,9 +68,10 @@ bool edge_agrees(int at, const CellSamples& expected, const CellSamples& seen) {
 
 /// The cell, among those of half the size, that is this quarter of a cell.
 int quarter_of(int at, int quarter) {
-  const int x = 2 * (at % PrintDetails::kSide) + quarter % 2;
-  const int y = 2 * static_cast<int>(at / PrintDetails::kSide) + static_cast<int>(quarter / 2);
-  return y * 2 * PrintDetails::kSide + x;
+  const int x = 2 * (at % PrintDetails::kDetailSide) + quarter % 2;
+  const int y =
+      2 * static_cast<int>(at / PrintDetails::kDetailSide) + static_cast<int>(quarter / 2);
+  return y * 2 * PrintDetails::kDetailSide + x;
 }
 
 }  // namespace
@@ -107,7 +108,7 @@ void PrintDetails::update(Cell& cell, const CellMatch& match, bool coarse, const
   }
 }
 
-/// Goes on where what was compared says no more; a cell agrees as its last quarter does.
+/// Continues where the compared cells say no more; a cell agrees as its last quarter does.
 void PrintDetails::next_quarter(Cell& cell) {
   if (cell.state == CellState::kDiffers || cell.state == CellState::kPrinted) return;
   const bool last = cell.quarter == 4;
@@ -120,9 +121,9 @@ void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
                         std::span<const GrayImage> pyramid, const glm::vec3& from, int count,
                         bool all) {
   if (!print.surface.flat()) return;
-  const CellGrid whole(print, map, pyramid, kSide);
+  const CellGrid whole(print, map, pyramid, kDetailSide);
   if (whole.spread() > kResolved) return;
-  const CellGrid quarters(print, map, pyramid, 2 * kSide);
+  const CellGrid quarters(print, map, pyramid, 2 * kDetailSide);
   const bool closer = quarters.spread() <= kResolved;
   CellSamples expected{};
   CellSamples blurred{};
@@ -135,7 +136,7 @@ void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
     const bool part = cell.quarter > 0 && !all;
     if (part && !closer) continue;
     --count;
-    const int side = part ? 2 * kSide : kSide;
+    const int side = part ? 2 * kDetailSide : kDetailSide;
     const int which =
         part ? quarter_of(static_cast<int>(at), cell.quarter - 1) : static_cast<int>(at);
     if (!(part ? quarters : whole).see(which, seen)) continue;
@@ -166,7 +167,7 @@ double PrintDetails::likeness(const std::array<bool, kCells>& those) const {
   int sum = 0;
   int count = 0;
   for (std::size_t at = 0; at < cells_.size(); ++at) {
-    const std::size_t cell = at / kSide / 2 * kCellSide + at % kSide / 2;
+    const std::size_t cell = at / kDetailSide / 2 * kCellSide + at % kDetailSide / 2;
     if (!those[cell] || cells_[at].likeness == 0) continue;
     sum += cells_[at].likeness;
     ++count;
@@ -176,7 +177,7 @@ double PrintDetails::likeness(const std::array<bool, kCells>& those) const {
 
 namespace {
 
-using Rows = std::array<std::uint32_t, PrintDetails::kSide>;  // of cells, as bits
+using Rows = std::array<std::uint32_t, PrintDetails::kDetailSide>;  // of cells, as bits
 
 /// Adds to `cells` those of `within` that are connected with them.
 void grow(const Rows& within, Rows& cells) {
@@ -199,24 +200,24 @@ int PrintDetails::differences() const {
   Rows open{};     // cells that do not agree,
   Rows reached{};  // those of them connected with the edge,
   Rows printed{};
-  constexpr std::uint32_t kSides = 1u | 1u << (kSide - 1);
-  for (std::size_t y = 0; y < kSide; ++y) {
-    for (std::size_t x = 0; x < kSide; ++x) {
-      const Cell& cell = cells_[y * kSide + x];
+  constexpr std::uint32_t kSides = 1u | 1u << (kDetailSide - 1);
+  for (std::size_t y = 0; y < kDetailSide; ++y) {
+    for (std::size_t x = 0; x < kDetailSide; ++x) {
+      const Cell& cell = cells_[y * kDetailSide + x];
       const bool passes = cell.state != CellState::kAgrees && cell.state != CellState::kPlain;
       open[y] |= passes ? 1u << x : 0u;
       reached[y] |= passes && !cell.edge_agrees ? 1u << x : 0u;
       printed[y] |= cell.state == CellState::kPrinted ? 1u << x : 0u;
     }
-    if (y > 0 && y < kSide - 1) reached[y] &= kSides;
+    if (y > 0 && y < kDetailSide - 1) reached[y] &= kSides;
   }
   grow(open, reached);
   int count = 0;
-  for (std::size_t y = 0; y < kSide; ++y) {
+  for (std::size_t y = 0; y < kDetailSide; ++y) {
     open[y] &= ~reached[y];
     printed[y] &= open[y];
   }
-  for (std::size_t y = 0; y < kSide; ++y) {
+  for (std::size_t y = 0; y < kDetailSide; ++y) {
     while ((printed[y] & open[y]) != 0) {
       Rows part{};
       part[y] = printed[y] & open[y];
@@ -225,7 +226,7 @@ int PrintDetails::differences() const {
       int of_part = 0;
       int cells = 0;
       std::uint32_t at_edge = part.front() | part.back();
-      for (std::size_t k = 0; k < kSide; ++k) {
+      for (std::size_t k = 0; k < kDetailSide; ++k) {
         of_part += std::popcount(printed[k] & part[k]);
         cells += std::popcount(part[k]);
         at_edge |= part[k] & kSides;

@@ -22,8 +22,8 @@ namespace modar::tracker {
 /// so far away that the frame resolves less than the cells' samples.
 class PrintDetails {
  public:
-  static constexpr int kSide = 2 * kCellSide;
-  static constexpr int kDetailCells = kSide * kSide;
+  static constexpr int kDetailSide = 2 * kCellSide;
+  static constexpr int kDetailCells = kDetailSide * kDetailSide;
 
   /// Compares `count` cells that do not agree yet; kDetailCells: all, for likeness(). from:
   /// direction from the pattern to the camera.

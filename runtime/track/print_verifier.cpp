@@ -17,18 +17,19 @@ constexpr std::uint32_t kCellStride = 23;  // spreads them; coprime to their num
 constexpr std::uint32_t kVerifyEvery = 16;
 // Variance above which the frame's contents of a cell count as textured.
 constexpr float kShownContrast = 9.0f;
-// Number of cells with printed evidence from which it is another print, also as a share (1 / n) of
-// the textured cells in view; and the share of differing cells below which it is the pattern again.
+// Cells with printed evidence from which it is another print. Lower hides true prints, higher shows
+// other ones.
 constexpr int kOtherCells = 6;
+// The same as a share (1 / n) of the textured cells in view.
 constexpr int kOtherShare = 8;
+// Share (1 / n) of differing cells below which it is the pattern again.
 constexpr int kAgainShare = 10;
-// Details compared per frame, all of them within 32: trades instructions, about 7 % of a tracked
-// frame by count of instructions, for how soon another print is hidden, here within two seconds.
+// Details compared per frame. More detect another print sooner; all are compared within 32 frames.
 constexpr int kDetailsOfFrame = 8;
-// Number of printed differences from which it is another print, and below which it is the pattern
-// again: trades other prints shown for true ones hidden. `modar-lab bench pose --lookalikes --only
-// family` found 8 to 35 on most other prints, and none or one on true ones.
+// Printed differences from which it is another print. Lower hides true prints, higher shows other
+// ones.
 constexpr int kOtherDetails = 3;
+// Printed differences below which it is the pattern again.
 constexpr int kAgainDetails = 2;
 // Margin in cells by which a mirror image, or another pattern, must agree better.
 constexpr int kFlippedCells = 4;
@@ -36,43 +37,40 @@ constexpr double kSureShare = 0.6;  // share of agreeing textured cells that ref
 constexpr double kItselfShare = 0.94;       // from here on fewer than kFlippedCells disagree
 constexpr double kTriedMirrorShare = 0.75;  // no mirror image left a larger share in agreement
 constexpr int kActualCells = 3;
-// Relative drop of a cell's correlation (stored in percent) that counts as changed by the pose or
-// by blur, and the share (1 / n) of agreeing cells that must have changed for a slipped pose. On
-// twelve patterns, 60 frames each of three fast paths, this found all 6 poses that had slipped by
-// 10 to 69 pixels, and 8 of 2,100 others, 6 of which PoseLoop does not test.
+// Relative drop of a cell's correlation, stored in percent, that counts as a change. Higher finds
+// slips later, lower rejects true poses.
 constexpr float kSlippedLikeness = 0.85f * 0.01f;
+// Share (1 / n) of the agreeing cells that must have changed for a slipped pose.
 constexpr int kSlippedShare = 4;
-// Displacement of the corners by curvature, in frame pixels, above which a print is curved: visible
-// in a frame 1280 wide. A larger one is needed if the pose is only the closest to a map, since a
-// wrong focal length looks like curvature, unless that map explains this share of textured cells.
+// Frame pixels by which curvature moves the corners of a print that counts as curved. Lower rejects
+// flat prints, higher shows bent ones flat.
 constexpr double kBentPixels = 5.0;
+// The same for a map, since a wrong focal length looks like curvature.
 constexpr double kMapBentPixels = 10.0;
+// Share of textured cells that the map must explain to be judged by the smaller limit.
 constexpr double kFlatMapShare = 0.9;
 
-// Share of agreeing cells below which these must look like the print's own: their mean correlation,
-// and kNeighbour for each of a cell's eight neighbours that agrees, too. What hides a print leaves
-// whole parts of it, alike to 0.86 to 1.1 by this sum in 186 frames, half and 70 % covered or under
-// glare; cells of other regular prints agree here and there, and had 0.74 to 0.86 where such prints
-// were taken for each other (`modar-lab bench clutter`). A landscape was seen in one of 7,500
-// frames with a share of 0.5, and 0.6 changes nothing where prints are half or 70 % covered.
+// Fraction of matching cells below which cells must also look like the print. Lower: false finds in
+// clutter; higher: covered prints lost. [0.5, 0.7] tuned: clutter
 constexpr double kPlainShare = 0.6;
+// Likeness added per agreeing neighbour of a cell. Higher favours coherent parts, as occluders
+// leave them.
 constexpr double kNeighbour = 0.04;
+// Mean likeness that the agreeing cells need. Lower confuses regular prints, higher loses covered
+// ones.
 constexpr double kOwnLook = 0.855;
-// What less than so many cells must have beyond that in all: a few are alike by chance. 8 to 10 of
-// a card in a grid of dots had up to 0.82 (16 of 20,000 frames of `bench clutter`); no true print
-// of 432, covered by 70 %, was seen by so few. More cells are not asked for it: of 21, true prints
-// had 0.06.
-constexpr double kFew = 1.0;
-constexpr int kFewCells = 11;
+// Likeness that few cells need in addition. Lower accepts chance, higher loses covered prints.
+constexpr double kFewCellsPenalty = 1.0;
+// Cells below which they are few. True prints showed more.
+constexpr int kManyCells = 11;
 
-// What the details of a regular print must correlate by in the mean, and by how much they may fall
-// behind the cells that they lie in, from this share of agreeing cells on. True prints had 0.83 and
-// more in bare sight and half covered, and were 0.04 behind at most (`modar-lab bench pose` on 18
-// of the clutter's prints). A grid taken for another one of its pitch was 0.058 to 0.34 behind (53
-// of 20,000 frames of `bench clutter`, seeds 18 to 25). Not asked of other prints: bent ones fall
-// behind as much.
+// Mean correlation that a regular print's details need. Lower accepts grids of equal pitch, higher
+// loses half-covered prints.
 constexpr double kDetailLike = 0.78;
+// Correlation by which the details may be below their cells'. Higher accepts other grids, lower
+// loses true prints.
 constexpr double kDetailLoss = 0.05;
+// Share of agreeing cells from which details are compared.
 constexpr double kMostCovered = 0.4;
 
 constexpr std::uint8_t kForFlip[2] = {1, 2};
@@ -236,8 +234,8 @@ bool PrintVerifier::fits_mirrored(std::size_t pattern, const FrameView& frame,
   return false;
 }
 
-/// A search finds a mirror image where a part of the pattern is its own one: the mirror lies where
-/// most of the cells that agree are alike.
+/// A search finds a mirror image where a part of the pattern is its own one: the mirror is where
+/// most of the agreeing cells are alike.
 void PrintVerifier::place_mirrors(std::size_t pattern) {
   std::array<bool, kCells> agreeing{};
   for (std::size_t at = 0; at < agreeing.size(); ++at) {
@@ -279,7 +277,7 @@ bool PrintVerifier::scattered(const Evidence& seen) {
     }
   }
   return likeness + kNeighbour * neighbours <
-         kOwnLook * agreeing + (agreeing < kFewCells ? kFew : 0.0);
+         kOwnLook * agreeing + (agreeing < kManyCells ? kFewCellsPenalty : 0.0);
 }
 
 /// Whether the cells that agree do so at large only: after a look at all of a regular print.

@@ -23,11 +23,11 @@ namespace modar::tracker {
 /// agree, others do not. Over time they differ: an object in front of the paper covers another
 /// place when seen from another direction, and a hand moves, whereas the contents of another print
 /// stay in their cell, sharp, from every direction. Therefore a disagreeing cell with texture
-/// counts as evidence once it looked the same from two directions. Things that lie flat on the
-/// print and do not move count as printed, too; the limits leave room for fingers that hold a page.
-/// A mirror image, and another pattern of the bundle in the same place, are recognised at once: by
-/// the cells that agree with them and disagree with the pattern. A search finds a mirror image
-/// where a part of the pattern is symmetric, so the mirror axis is assumed there.
+/// counts as evidence once it looked the same from two directions. Flat objects that stay on the
+/// print count as printed, too; the limits leave room for fingers that hold a page. A mirror image,
+/// and another pattern of the bundle in the same place, are recognised at once: by the cells that
+/// agree with them and disagree with the pattern. A search finds a mirror image where a part of the
+/// pattern is symmetric, so the mirror axis is assumed there.
 class PrintVerifier {
  public:
   /// The patterns must outlive it. Allocates nothing later.

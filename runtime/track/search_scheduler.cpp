@@ -7,8 +7,8 @@
 namespace modar::tracker {
 namespace {
 
-// Budget of a frame, in millions of instructions, from which a find is refined and verified in the
-// frame that completes the search. With a smaller budget the next frame does both.
+// Budget, million instructions per frame, from which the searching frame refines and verifies, too.
+// Below it, the next frame does.
 constexpr int kVerifyingBudget = 20;
 
 }  // namespace
@@ -48,7 +48,7 @@ bool SearchScheduler::take() {
 bool SearchScheduler::advance(std::ptrdiff_t tracked) {
   // Pyramid, a copy of the frame, and by what a step may exceed its cost.
   constexpr std::int64_t kFrameCost = 2'000'000;
-  constexpr std::int64_t kTrackCost = 3'000'000;  // of a pattern; as much to bring a find here
+  constexpr std::int64_t kTrackCost = 3'000'000;  // of a pattern; as much to move a find here
   if (sliced_ == nullptr) return false;
   const std::int64_t work =
       std::int64_t{1'000'000} * options_.budget - kFrameCost - kTrackCost * (tracked + 1);

@@ -22,7 +22,7 @@ class SearchScheduler {
   /// Candidates of a search on a thread of its own that has ended; false: none, or it started
   /// before reset().
   bool take();
-  /// Goes on with a sliced search by what tracking left of the frame's budget. True where there are
+  /// Continues a sliced search within the rest of the frame's budget. True where there are
   /// candidates. tracked: patterns, of which extended tracking counts as one.
   bool advance(std::ptrdiff_t tracked);
   /// Whether this frame is searched for the patterns that are not tracked; sets their priorities.

@@ -14,27 +14,24 @@
 namespace modar::tracker {
 namespace {
 
-// Frames between measurements of a plane for the camera's estimate: trades their time, half of that
-// of tracking, for how soon the camera is known. The next one comes after kMeasureSoon frames if
-// the last one moved a corner by kMovedShape pixels: with a wrong focal length, the shape lags
-// behind a rotation. A plane counts as flat if at least kFlatPatches patches fit,
-// and as open where kFlatRatio of those in view do.
+// Frames between measurements of a plane for the camera's estimate. Fewer know the camera sooner
+// and take half the time of tracking.
 constexpr int kMeasureEvery = 5;
+// The same if the last measurement moved a corner noticeably.
 constexpr int kMeasureSoon = 2;
+// Pixels that count as such a move. With a wrong focal length, the shape lags behind a rotation.
 constexpr double kMovedShape = 0.4;
+// Patches that must fit for a plane to count as flat.
 constexpr int kFlatPatches = 24;
+// Share of the patches in view that must fit for a plane to count as open.
 constexpr double kFlatRatio = 0.6;
 // Iterations of a free homography that starts at the pose, and the weight of a new measurement in
 // the shape: a smaller one lags, a larger one jitters.
 constexpr int kMeasuringSteps = 2;
 constexpr double kNewShape = 0.7;
-// Displacement, rms template pixels, by which the patches of a find of which little shows give away
-// that no plane explains them (kUnrest is the same for a pose of a known camera). Swept on 70 %
-// covered, 1,080 frames: of 89.1 % right and 3.3 % wrong without it, 87.6 and 1.8 with 0.35, 88.7
-// and 2.3 with 0.48, 88.8 and 2.5 with 0.55. With 0.48, 2 of 72 true finds out of focus were lost,
-// with 0.55 none (`modar-lab bench pose --field --only "defocus 4 px"`); of 72 under glare, with
-// 0.55 one of 68 right ones and one of two wrong ones.
-constexpr double kPlaneUnrest = 0.55;
+// Max. rms residual (template px) for a mostly hidden pattern to count as planar. Lower rejects
+// defocused true finds; higher accepts false ones. [0.35, 0.55] tuned: pose
+constexpr double kMaxPlaneResidual = 0.55;
 // Relative change of the focal length after which the learned surroundings are discarded.
 constexpr double kLearnedAnew = 0.01;
 
@@ -46,7 +43,7 @@ bool shows_flat(const PatchFit& fit) {
 /// false if that part is too small.
 bool places_in_view(const TrackedPattern& pattern, const PlaneMap& map, const Camera& camera,
                     CameraEstimator::View& view) {
-  constexpr double kLeast = 0.4;  // of each side
+  constexpr double kMinExtent = 0.4;  // of each side
   constexpr double kStep = 0.1;
   const double longest = std::max(pattern.width(), pattern.height());
   glm::dvec2 low{0.05, 0.05};  // shares of width and height
@@ -77,7 +74,7 @@ bool places_in_view(const TrackedPattern& pattern, const PlaneMap& map, const Ca
       low += kStep;
       high -= kStep;
     }
-    if (high.x - low.x < kLeast || high.y - low.y < kLeast) return false;
+    if (high.x - low.x < kMinExtent || high.y - low.y < kMinExtent) return false;
   }
 }
 
@@ -92,9 +89,9 @@ bool SelfCalibration::measure(std::size_t i, Detection& detection) {
   track.frames_to_measure = kMeasureEvery;
   CameraEstimator::View view{i, {}, {}, track.pose};
   bool open = detection.inliers >= kFlatRatio * detection.matches;
-  bool restless = false;
-  if (!(track.measured ? measure_again(i, view) : measure_first(i, view, open, restless)))
-    return !restless;
+  bool inconsistent = false;
+  if (!(track.measured ? measure_again(i, view) : measure_first(i, view, open, inconsistent)))
+    return !inconsistent;
   if (open && estimator_.is_new(i, view.pixels)) estimator_.add(view);
   const std::array<glm::dvec2, 4> before = detection.corners;
   frames_.locate(patterns_[i], track, detection);
@@ -121,7 +118,7 @@ bool SelfCalibration::view_plane(const TrackedPattern& plane, const Pose& pose,
 /// open: whether nothing covers it; corners beyond what does would say more of the camera than they
 /// know.
 bool SelfCalibration::measure_first(std::size_t i, CameraEstimator::View& view, bool& open,
-                                    bool& restless) {
+                                    bool& inconsistent) {
   Track& track = tracks_[i];
   TrackedPattern plane = patterns_[i];
   Pose pose = track.pose;
@@ -134,8 +131,9 @@ bool SelfCalibration::measure_first(std::size_t i, CameraEstimator::View& view, 
   }
   PatchFit fit;
   const bool fits = refine_plane(plane, frames_.frame(), pose, fit);
-  restless = fit.unrest >= kPlaneUnrest;
-  if (!fits || restless || !shows_flat(fit) || !view_plane(plane, pose, view, split)) return false;
+  inconsistent = fit.residual_rms >= kMaxPlaneResidual;
+  if (!fits || inconsistent || !shows_flat(fit) || !view_plane(plane, pose, view, split))
+    return false;
   track.pose = split.pose;
   patterns_[i].shape = split.shape;
   open = fit.open();
@@ -157,7 +155,7 @@ bool SelfCalibration::measure_again(std::size_t i, CameraEstimator::View& view) 
       !view_plane(plane, pose, view, split)) {
     return false;
   }
-  // Tracking weighs patches otherwise: it goes on from its own pose, as the shape moves that, and
+  // Tracking weighs patches otherwise: it continues from its own pose, moved by the shape, and
   // its motion from where that shape would have had the pattern a frame before.
   const Pose moved = change.pose_after(track.pose, kNewShape);
   const glm::dmat3 undo = glm::transpose(track.pose.rotation);

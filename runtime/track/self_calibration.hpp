@@ -25,9 +25,9 @@ class SelfCalibration {
         frames_(frames),
         estimator_(camera, patterns.size()) {}
 
-  /// Once a frame, before its patterns: goes on with the focal length and the aspects that the
-  /// views so far say. True where the focal length has moved so far since the last time that what
-  /// was learned with it is wrong.
+  /// Once a frame, before its patterns: continues with the focal length and the aspects estimated
+  /// from the views so far. True if the focal length has moved so far that everything learned with
+  /// it is wrong.
   bool apply();
   /// Measures a tracked flat pattern's free homography: what it says of the camera, and what a pose
   /// leaves of it, since no camera explains the pictures of a stabilised or distorting one.
@@ -45,7 +45,7 @@ class SelfCalibration {
  private:
   bool view_plane(const TrackedPattern& plane, const Pose& pose, CameraEstimator::View& view,
                   PlaneSplit& split) const;
-  bool measure_first(std::size_t i, CameraEstimator::View& view, bool& open, bool& restless);
+  bool measure_first(std::size_t i, CameraEstimator::View& view, bool& open, bool& inconsistent);
   bool measure_again(std::size_t i, CameraEstimator::View& view);
 
   Camera& camera_;

@@ -11,9 +11,8 @@
 namespace modar::tracker {
 namespace {
 
-// Multiples of a feature's pixel within which matches join, from round to round: the tangent
-// plane's pose is right near its matches only, and each round reaches further. The sequence is set
-// by hand, after that of the homographies.
+// Multiples of a feature's pixel within which matches join, by round: the tangent plane's pose is
+// right near its matches only. Not swept.
 constexpr std::array<double, 6> kRounds = {12.0, 8.0, 5.0, 4.0, 3.0, 3.0};
 // Share of the better pose's matches below which its mirror image is ruled out.
 constexpr double kMirrorShare = 0.75;
@@ -63,7 +62,7 @@ Pose mirrored_about(const TrackedPattern& pattern, glm::dvec2 place, const Pose&
 
 namespace {
 
-/// Leaves of the matches in a mask those on one face of a box, on which most of them lie: that is
+/// Leaves of the matches in a mask those on one face of a box, on which most of them are: that is
 /// all that a homography explains, and a match by chance on another face turned the pose by 30
 /// degrees.
 void keep_one_face(const PatternSurface& surface, std::span<const FeatureMatch> matches,

@@ -15,75 +15,70 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-// Frames are read on the level that is at most this wide: a patch of 9 pixels sees a corner of a
-// room there, and its place is known to a tenth of a pixel, a sixtieth of a degree.
+// Widest level that frames are read on, pixels. Larger is more exact and slower.
 constexpr int kMaxWidth = 400;
-// And first so many levels coarser against the frame before: patches find their place from some 3
+// And first this many levels coarser against the frame before: patches find their place from some 3
 // pixels away, which are 12 there.
 constexpr int kCoarser = 2;
-// Cells of a frame, each with one point at most: more points cost time, fewer are lost behind a
-// hand. Of the cells some are looked at in each frame, all in half a second. Swept on rooms: 0.78,
-// 0.16 and 0.16 % with 3, 6 and 12 a frame.
+// Cells of a frame across, each with one point at most. More take time, fewer are lost behind a
+// hand.
 constexpr int kColumns = 10;
+// The same down.
 constexpr int kRows = 8;
+// Cells that each frame searches for new points. More learn faster and take time. [3, 12] tuned:
+// extended
 constexpr int kCellsAFrame = 6;
-// A point is dropped after so many misses in a row: soon while it is new, late once it is steady,
-// since a passer-by may hide it for seconds. Swept on rooms: flat from 4 to 16, and at twice the
-// second.
+// Misses in a row after which a new point is dropped. More keep moving points. [4, 16] tuned:
+// extended
 constexpr int kMissesOfNew = 8;
+// The same for a steady point. Fewer lose points behind a passer-by.
 constexpr int kMissesOfSteady = 90;
-// Hits, and inverse depths over their standard deviation, from which a point is steady: without the
-// second, a still camera's surroundings are followed. Swept on rooms: 0.14, 0.16 and 0.88 % with 4,
-// 8 and 16, and 0.16 and 0.17 % with 5 and 10.
+// Hits from which a point is steady. Fewer trust moving points, more learn slowly. [4, 16] tuned:
+// extended
 constexpr int kSteadyHits = 8;
+// Inverse depth over its standard deviation from which a point is steady. Lower follows a still
+// camera's surroundings. [5, 10] tuned: extended
 constexpr double kSteadyDepth = 5.0;
-// Pixels of the level that it must have gone, and been seen where the pattern's motion has it: well
-// beyond kMaxOffset, so that what stays while the pattern trembles in a hand is not taken for it.
+// Pixels of the level that a steady point must have moved. Lower accepts static clutter while the
+// pattern trembles in a hand.
 constexpr double kSteadyTravel = 5.0;
 // Hits from which a point is used that was learned without the pattern: a turning camera shows no
 // depths, and soon none of the older points.
 constexpr int kUsableHits = 3;
-// Steady points that must be seen, to begin and to go on: three determine a pose. And the frames
-// without that are bridged by the last motion. Swept on rooms: flat at twice either.
+// Steady points in view at least. Fewer follow longer and tell a pose badly.
 constexpr int kLeastPoints = 8;
+// Frames that the last motion bridges without them. More show guesses.
 constexpr int kBridged = 10;
-// What covers the pattern and stands still for a while has points as well, and goes away with
-// them: the weight of points learned without the pattern (of 0.03 to 1, the best on two rooms), and
-// the others that must be seen in each half of the frame, left, right, upper and lower, for that:
-// those of one side alone tell a pose badly. Swept on rooms: 0.17, 0.16 and 0.16 % with 2, 5
-// and 10.
+// Weight of points learned without the pattern, which may belong to an occluder. Higher follows
+// longer and may leave with the occluder. [0.03, 1]
 constexpr double kNewWeight = 0.3;
+// Other points needed in each half of the frame for that. [2, 10] tuned: extended
 constexpr int kEnoughSteady = 5;
-// And someone who fills the frame hides all others for a while, and would turn the world with him:
-// of the points that were learned from the pattern, or seen for a second, a share must be where
-// they should be, if so many are in view. Swept on rooms: flat at twice the first two; 46, 46 and
-// 34 % of the frames are followed with shares of 0.17, 0.35 and 0.7, 0.22, 0.22 and 0.13 degrees
-// off.
+// Hits from which a point is known, in addition to those learned from the pattern.
 constexpr int kKnownHits = 30;
+// Known points in view from which the next limit applies.
 constexpr int kLeastKnown = 8;
+// Reject a large moving foreground: this fraction of the known points in view must agree. [0.17,
+// 0.7] tuned: extended
 constexpr double kKnownShare = 0.35;
-// Information of a patch's equations as they stand, 1 / square pixels; see kHonest. Swept on rooms:
-// 0.19, 0.16 and 0.17 % with 0.5, 1 and 2.
+// Information of a patch's equations, per square pixel; see kHonest. [0.5, 2] tuned: extended
 constexpr double kInformation = 1.0;
-// What one frame adds to a depth, of that: frames in a row see the same template with the same
-// error. And the accuracy in pixels that no baseline exceeds. Swept on rooms: 0.20, 0.16 and 0.17 %
-// with half, once and twice the first, and 0.17, 0.16 and 0.17 % of the second.
+// Share of a frame's information that a depth gains: consecutive frames repeat their error. [0.06,
+// 0.25] tuned: extended
 constexpr double kDepthGain = 0.125;
+// Pixels of accuracy that no baseline exceeds. [0.08, 0.3] tuned: extended
 constexpr double kDepthAccuracy = 0.15;
-// Pixels of the level by which a point may be seen beside its place: the pattern's own pose is off
-// by half of it at the frame's far side. Swept on rooms: 0.15, 0.16 and 0.17 % with 0.75, 1.5
-// and 3.
+// Pixels of the level by which a point may miss its prediction. Higher follows moving points, lower
+// loses far ones. [0.75, 3] tuned: extended
 constexpr double kMaxOffset = 1.5;
-// Standard deviations are stated so many times larger than the equations say, which take errors of
-// depths and anchors for independent: of `modar-lab bench extended` 95 % lie within two of these
-// then.
+// Factor on the equations' standard deviations, which ignore shared errors of depths and anchors.
+// Lower states too much certainty.
 constexpr double kHonest = 4.0;
-// Standard deviations of a gyroscope's turn: radians a frame, somewhat more than `modar-lab bench
-// extended` adds, and the share of the whole turn by which its scale may be off. Larger ones leave
-// more to the points. Swept on the turned room with a gyroscope: 0.16, 0.18 and 0.24 % and 0.087,
-// 0.075 and 0.073 degrees off with half, once and twice the first, 0.17, 0.18 and 0.21 % and 0.076,
-// 0.075 and 0.065 degrees of the second.
+// Standard deviation of a gyroscope's turn, radians per frame. Larger trusts the points more.
+// [0.00025, 0.001] tuned: extended
 constexpr double kTurnSigma = 0.0005;
+// Relative error of the gyroscope's scale. Larger trusts the points more. [0.005, 0.02] tuned:
+// extended
 constexpr double kTurnScale = 0.01;
 
 Pose compose(const Pose& a, const Pose& b) {
@@ -95,7 +90,7 @@ Pose inverse(const Pose& pose) {
   return {back, -(back * pose.translation)};
 }
 
-/// Where a point lies in a frame.
+/// The place of a point in a frame.
 struct Projection {
   glm::dvec3 direction{};  ///< camera axes: the point times its inverse depth
   glm::dvec2 pixel{};      ///< of the level
@@ -104,7 +99,7 @@ struct Projection {
   glm::dvec2 by_depth{};  ///< pixels of the level per unit of inverse depth
 };
 
-/// False if it lies behind the camera, or is seen too differently from its patch.
+/// False if it is behind the camera, or is seen too differently from its patch.
 bool place(const Camera& camera, const MapPoint& point, const Pose& pose, int level,
            Projection& out) {
   const double shrink = 1.0 / static_cast<double>(1 << level);
@@ -215,8 +210,8 @@ glm::dvec2 rest_of(const MapPointEquations& one, const Vector6& change) {
 
 /// Tukey's weight by that rest: a point that moved by itself asks for another place.
 double robust_weight(const MapPointEquations& one, const Vector6& change) {
-  // Template pixels, beyond what noise does. Swept on rooms: 0.15, 0.16 and 0.17 % with 0.75, 1.5
-  // and 3.
+  // Template pixels beyond noise. Lower drops true points, higher keeps moving ones. [0.75, 3]
+  // tuned: extended
   constexpr double kFar = 1.5;
   const glm::dvec2 rest = rest_of(one, change);
   const double far = std::min(1.0, glm::dot(rest, rest) / (kFar * kFar));
@@ -279,7 +274,7 @@ MapFit linearise(const Camera& camera, const FrameView& frame, std::span<const M
 }
 
 /// One Gauss-Newton step. Returns the way of the patch that moves furthest, template pixels;
-/// negative if there is none.
+/// negative if none exists.
 double step_pose(const std::vector<MapPointEquations>& equations, const ExpectedRotation& expected,
                  bool robust, Pose& pose, PoseSystem& system) {
   Vector6 change = Vector6::Zero();
@@ -311,7 +306,7 @@ double step_pose(const std::vector<MapPointEquations>& equations, const Expected
 
 // ---- One point's own place and depth ----
 
-/// Follows the patch to where the frame shows it, from where it was seen beside its place before.
+/// Follows the patch to its place in the frame, from its last offset.
 bool find_offset(const FrameView& frame, const Projection& at, int level, MapPoint& point,
                  PatchNormalEquations& equations) {
   constexpr int kFindSteps = 3;
@@ -418,7 +413,7 @@ Pose Surroundings::predict(const glm::dvec3* turn) const {
 void Surroundings::align_coarse(const FrameView& frame, const glm::dvec3* turn, Pose& pose) {
   constexpr int kCoarseSteps = 5;
   constexpr double kConverged = 0.1;
-  constexpr int kLeast = 6;
+  constexpr int kMinPoints = 6;
   if (static_cast<std::size_t>(coarse_) >= frame.pyramid.size() || known_ == 0) return;
   coarse_points_.clear();
   const bool of_pattern = enough_of_pattern();
@@ -454,7 +449,7 @@ void Surroundings::align_coarse(const FrameView& frame, const glm::dvec3* turn, 
     const MapFit fit = linearise(camera_, frame, coarse_points_, 1.0, coarse_,
                                  step == 0 ? kTukeyFirst : kTukey, pose, equations_);
     const double moved =
-        fit.visible < kLeast ? -1.0 : step_pose(equations_, expected, step > 1, pose, system);
+        fit.visible < kMinPoints ? -1.0 : step_pose(equations_, expected, step > 1, pose, system);
     if (moved < 0.0) {
       pose = start;
       return;
@@ -475,8 +470,8 @@ ExpectedRotation Surroundings::expected_rotation() const {
 bool Surroundings::align_fine(const FrameView& frame, Pose& pose, ExtendedPose& out) {
   constexpr int kFineSteps = 8;
   constexpr double kConverged = 0.03;
-  // Of the points in view, of which others hide some. Swept on rooms: 46, 46 and 34 % followed with
-  // 0.17, 0.35 and 0.7.
+  // Share of the points in view that must agree; others are hidden. Lower follows wrong poses,
+  // higher loses true ones. [0.17, 0.7] tuned: extended
   constexpr double kLeastShare = 0.35;
   constexpr double kPlaced = 0.8;  // template pixels that a point in its place still asks for
   const ExpectedRotation expected = expected_rotation();
@@ -618,7 +613,7 @@ glm::ivec2 Surroundings::best_corner(const GrayImage& image, int cell) {
   return best;
 }
 
-/// Room for a point: of those out of view, the least known goes if there is none left.
+/// Room for a point: of those out of view, the least known is dropped if no cell is free.
 MapPoint* Surroundings::free_slot() {
   if (points_.size() < kMaxPoints) return &points_.emplace_back();
   constexpr int kOfPattern = 1000;  // hits that the truth of the pattern is worth
@@ -661,7 +656,7 @@ bool Surroundings::add_point(const FrameView& frame, const Pose& pose, int colum
 
 namespace {
 
-/// Whether a pixel lies in the outline of the pattern, or so near that a patch touches it.
+/// Whether a pixel is in the outline of the pattern, or so near that a patch touches it.
 bool near_outline(const std::array<glm::dvec2, 4>& corners, glm::dvec2 pixel, double margin) {
   for (std::size_t i = 0; i < 4; ++i) {
     const glm::dvec2 side = corners[(i + 1) % 4] - corners[i];

@@ -25,7 +25,7 @@ struct ExtendedPose {
 };
 
 /// Standard deviation of the rotation of a pattern's own pose, radians: 0.14 degrees with 200
-/// patches in place, 0.3 with 100, as they were off in one rendered room.
+/// patches in place, 0.3 with 100, in one rendered room.
 inline double seen_sigma(int patches) {
   constexpr double kOfPatches = 0.5;  // radians times patches
   return kOfPatches / std::max(patches, 1);
@@ -78,8 +78,7 @@ struct ExpectedRotation {
 /// A map of at most kMaxPoints points in the coordinates of one pattern. Allocates nothing after
 /// construction. A point is an inverse depth along a ray of the frame that it was first seen in
 /// (after Civera, Davison & Montiel, "Inverse depth parametrization for monocular SLAM", 2008); a
-/// pose is aligned to all points in view at once, the depth of each eliminated by what is known of
-/// it.
+/// pose is aligned to all points in view at once, the depth of each eliminated by its estimate.
 class Surroundings {
  public:
   /// Trades memory, 1.3 KB a point, for how far the camera may turn away and know the way back:
@@ -91,7 +90,7 @@ class Surroundings {
   /// Forgets everything.
   void clear();
   /// The frame shows the pattern at that pose, with its corners there: measures the points against
-  /// it, drops those that do not keep their place, adds new ones beside the pattern. patches: of
+  /// it, drops those that do not keep their place, adds new ones around the pattern. patches: of
   /// the pattern, that are in their place. turn: as of follow().
   void learn(const FrameView& frame, const Pose& pose, const std::array<glm::dvec2, 4>& corners,
              int patches, const glm::dvec3* turn);
@@ -99,15 +98,15 @@ class Surroundings {
   /// moves with the camera, or stays while the pattern is moved, has no depth by motion, so it is
   /// not steady.
   [[nodiscard]] bool ready() const;
-  /// Share of the steady points seen last that are where this pose of a frame has them; 1 where
-  /// there are none.
+  /// Share of the steady points seen last that are where this pose of a frame has them; 1 if there
+  /// are no points.
   [[nodiscard]] double agreement(const FrameView& frame, const Pose& pose) const;
   /// The pose of a frame without the pattern. turn: rotation, in camera axes, of what the camera
   /// sees since the frame before, null: unknown. False if the points do not tell it; after
   /// kBridged such frames in a row everything is forgotten.
   bool follow(const FrameView& frame, const glm::dvec3* turn, ExtendedPose& out);
-  /// The pattern is seen at `seen`, where the points said `followed`: moves by the difference what
-  /// was learned meanwhile.
+  /// The pattern is seen at `seen`, where the points said `followed`: moves the points learned
+  /// meanwhile by the difference.
   void correct(const Pose& followed, const Pose& seen);
 
  private:

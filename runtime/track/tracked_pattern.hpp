@@ -41,7 +41,7 @@ struct TrackedPattern {
   std::array<GrayImage, kMaxTrackerImageLevels> levels;
   int level_count = 0;
   PatternSurface surface;
-  /// Of a flat pattern: what its plane is beside its picture, by the middle (the axes of
+  /// Of a flat pattern: its plane relative to its picture, by the middle (the axes of
   /// to_world()). Not of the record: while the camera is a guess, what a pose leaves of a measured
   /// homography.
   glm::dmat2 shape{1.0};
@@ -56,7 +56,7 @@ struct TrackedPattern {
 };
 
 /// Views a section's bytes, which must outlive the pattern. Every count and offset is validated,
-/// and every feature and patch lies within the image: nothing later checks again. Errors:
+/// and every feature and patch is within the image: nothing later checks again. Errors:
 /// kInvalidInput "tracker.record"; kUnsupported "tracker.record-version". shape: of a
 /// SectionType::kPatternShape section; none: flat.
 Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes, std::uint32_t index,

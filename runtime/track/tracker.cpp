@@ -58,8 +58,11 @@ constexpr int kFramesToKeep = 2;
 
 }  // namespace
 
-[[gnu::cold]] Hysteresis::Hysteresis(std::size_t pattern_count, bool predict)
-    : counters_(pattern_count), states_(pattern_count), predict_(predict) {}
+[[gnu::cold]] Hysteresis::Hysteresis(std::size_t pattern_count, bool predict, bool stills)
+    : counters_(pattern_count),
+      states_(pattern_count),
+      predict_(predict),
+      frames_to_show_(stills ? 1 : kFramesToShow) {}
 
 std::span<const Hysteresis::State> Hysteresis::step(std::span<const Detection> visible) {
   for (Counter& counter : counters_) counter.state.measured = false;
@@ -76,9 +79,9 @@ std::span<const Hysteresis::State> Hysteresis::step(std::span<const Detection> v
     Counter& counter = counters_[i];
     if (counter.state.measured) {
       // Not counted further: it would overflow in a session of years.
-      if (counter.seen < kFramesToShow) ++counter.seen;
+      if (counter.seen < frames_to_show_) ++counter.seen;
       counter.missed = 0;
-      if (counter.seen >= kFramesToShow) counter.state.shown = true;
+      if (counter.seen >= frames_to_show_) counter.state.shown = true;
     } else {
       counter.seen = 0;
       if (counter.missed <= kFramesToKeep) {

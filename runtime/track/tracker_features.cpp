@@ -70,7 +70,7 @@ int CornerFinder::weakest(const Corner* slots) const {
   return at;
 }
 
-/// Keeps a corner among a cell's strongest; what is weaker than these, among its spare ones.
+/// Keeps a corner among a cell's strongest; weaker ones are among its spare features.
 void CornerFinder::keep(Corner corner, int cell) {
   for (std::size_t list = 2 * static_cast<std::size_t>(cell);
        list / 2 == static_cast<std::size_t>(cell); ++list) {
@@ -169,13 +169,13 @@ constexpr int kMomentRadius = 14;  // the same, of the disk whose centroid is th
 // Two levels above the last one with features: tracking starts there (SearchRadius::kFar).
 constexpr int kPyramidLevels = kTrackerLevels + 2;
 constexpr int kMinSide = 16;
-// Score from which a corner's rank in its cell decides instead of its contrast. Without it a page
-// of print took all 1,250 features of a frame, and no pattern on it was found; with it 95 to 100 %.
+// Score from which a corner's rank in its cell decides instead of its contrast. Higher lets a page
+// of print take all features.
 constexpr int kSureScore = 40;
-// A frame with fewer corners for each megapixel is dim or flat: it is searched again, with each
-// level's threshold at so many standard deviations of its noise. Every frame that way would lose
-// true corners of bright frames to coarse levels' weak ones.
+// Corners per megapixel below which a frame is dim and searched again with lower thresholds. Higher
+// trades true corners of bright frames for weak ones.
 constexpr std::int64_t kFewCorners = 400;
+// Threshold of that search, standard deviations of the level's noise. Lower finds noise.
 constexpr int kNoiseSigmas = 4;
 constexpr int kLeastThreshold = 3;
 
@@ -357,7 +357,7 @@ void FeatureExtractor::State::smooth_level(std::size_t level) {
     const std::uint8_t* rows[5];
     for (int k = 0; k < 5; ++k) rows[k] = image.pixels + (y + k - 2) * image.stride;
     run.blur_columns(rows, sums, image.width);
-    // The two columns at each side are smoothed with what lies beyond; nothing reads them.
+    // The two columns at each side are smoothed with the pixels beyond; nothing reads them.
     run.blur_row(sums, smooth[level].data() + static_cast<std::ptrdiff_t>(y) * pitch, image.width);
   }
 }

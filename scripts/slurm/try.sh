@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Bakes a project on three Slurm nodes of this machine, kills one in the middle, and holds what comes out against one
-# machine's. By hand, as root, with slurm-wlm, munge and ninja-build installed:
+# machine's. Run it manually, as root, with slurm-wlm, munge and ninja-build installed:
 #   scripts/slurm/try.sh [FOLDER-OF-PROGRAMS]      (default: build/release/bin)
-# Everything lies in a folder under /tmp that is removed, and ends with the script.
+# Everything is in a folder under /tmp that is removed, and ends with the script.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 bin=$(cd "${1:-$root/build/release/bin}" && pwd)

@@ -1,4 +1,4 @@
-"""The bridge (runtime/android/bridge.cpp) in a JVM that checks each JNI call, against modar-play."""
+"""The bridge (runtime/extensions/android/bridge.cpp) in a JVM that checks each JNI call, against modar-play."""
 import json
 import os
 import pathlib
@@ -19,7 +19,7 @@ BRIDGE = ["Native", "ModarException", "Poses", "Gyroscope", "Media", "VideoCopy"
 SENSORS = ["hardware/Sensor", "hardware/SensorEvent", "hardware/SensorEventListener", "hardware/SensorManager", "os/Handler",
            "os/Looper", "os/Message", "media/MediaPlayer", "media/MediaExtractor", "media/MediaFormat", "media/MediaCodec", "media/MediaCrypto",
            "graphics/SurfaceTexture", "view/Surface", "opengl/GLES20", "opengl/GLES11Ext"]
-FLOATS = 40
+FLOATS = 45
 
 
 @unittest.skipUnless(have("javac", "java", "ffmpeg"), "no JDK or no ffmpeg")
@@ -121,7 +121,7 @@ class Bridge(ProgramTest):
                      *(value for corner in detection["corners"] for value in corner)]
             self.assertEqual(pose[4:24], floats(exact), f"frame {i}")
             self.assertEqual(pose[2], detection["inliers"])
-            self.assertEqual([v + 0.0 for v in pose[24:]], view_of(pose[4:13], pose[13:16], detection.get("stretch")), f"frame {i}")
+            self.assertEqual([v + 0.0 for v in pose[24:40]], view_of(pose[4:13], pose[13:16], detection.get("stretch")), f"frame {i}")
         return seen
 
     def test_pictures_are_the_players(self):
@@ -199,7 +199,7 @@ class Bridge(ProgramTest):
         print(f"the second half of {frames} frames: heap {heap:+} bytes, resident {resident:+} kB, JNI references {references:+}")
         self.assertEqual(references, 0, "JNI references")
         self.assertLess(heap, 100_000, "bytes of Java's heap")
-        if not os.environ.get("MODAR_SANITIZE"):  # ASan keeps what was freed for a while
+        if not os.environ.get("MODAR_SANITIZE"):  # ASan keeps freed memory for a while
             self.assertLess(resident, 4_000, "resident kilobytes")
 
 
@@ -232,8 +232,8 @@ class Targets(unittest.TestCase):
                 (folder / file).parent.mkdir(exist_ok=True)
                 (folder / file).write_text(text)
             unit = folder / "unit.cpp"
-            unit.write_text("".join(f'#include "{file}"\n' for file in sorted((ROOT / "runtime" / "android").glob("*.cpp"))))
-            # glibc stands for bionic, so the compiler must not say that this is Android.
+            unit.write_text("".join(f'#include "{file}"\n' for file in sorted((ROOT / "runtime" / "extensions" / "android").glob("*.cpp"))))
+            # glibc replaces bionic, so the compiler must not say that this is Android.
             for target in ("armv7a-linux-androideabi19", "aarch64-linux-android21", "i686-linux-android19", "x86_64-linux-android21"):
                 with self.subTest(target=target):
                     done = subprocess.run(

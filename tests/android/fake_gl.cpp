@@ -1,4 +1,4 @@
-// EGL for the fake android.opengl of the tests: a texture stands for the phone's window. It is what
+// EGL for the fake android.opengl of the tests: a texture replaces the phone's window. It is what
 // the player draws into, too: Mesa rounds otherwise in a pbuffer, whose rows go the other way.
 #include <array>
 #include <cstdlib>

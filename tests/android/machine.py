@@ -10,9 +10,9 @@ sys.path.insert(0, str(ROOT / "tests" / "cli"))
 
 from programs import BIN, CLIP_HEIGHT, CLIP_WIDTH, COVER, POTTERY, ProgramTest, covered_clip, demo_clip  # noqa: E402, F401
 
-JNI = os.environ.get("MODAR_JNI", str(BIN.parent / "runtime" / "android"))
+JNI = os.environ.get("MODAR_JNI", str(BIN.parent / "runtime" / "extensions" / "android"))
 FAKE_GL = os.environ.get("MODAR_FAKE_GL", str(BIN.parent / "tests" / "android"))
-APP = ROOT / "runtime" / "android" / "java"
+APP = ROOT / "runtime" / "extensions" / "android" / "java"
 FAKES = pathlib.Path(__file__).resolve().parent / "java"
 SOAK = os.environ.get("MODAR_SOAK") == "full"
 WIDTH, HEIGHT, FRAMES = CLIP_WIDTH, CLIP_HEIGHT, 10

@@ -5,7 +5,7 @@
 
 Makes the page of `modar web`, serves it as hosts do (scripts gzipped, one connection a file), and opens it with the camera showing
 VIDEO, which is to show the bundle's picture, on two lines: 1.6 Mbit/s and 400 kbit/s, both with 300 ms. The visitor presses the start
-button as soon as it is there. Prints JSON: seconds until the tracker recognises (seen), models are drawn on what was recognised (shown), and all is
+button as soon as it appears. Prints JSON: seconds until the tracker recognises (seen), models are drawn on the pattern (shown), and all is
 there (whole); bytes of the bundle; memory of all of the browser's processes at the end. Once with the raw bundle, once with the
 packed one.
 

@@ -7,9 +7,9 @@ Makes the page of `modar web`, serves it by ranges, and flies: from far down to 
 nearest, and at the end it holds still. With --pan it comes down in a quarter of the time, swings to and fro at the surface, and holds still
 at the end. Prints JSON: frames and the longest one of the flight (milliseconds, with the drawing, which is SwiftShader's on a CPU), the
 longest task of the page's own, bytes that came, those of them that had come before, the greatest number of bytes on the GPU, resident
-memory of all of the browser's processes beside a blank page's, the triangles that were drawn at the end of each hold, their mean over the
+memory of all of the browser's processes next to a blank page's, the triangles that were drawn at the end of each hold, their mean over the
 time of all pictures, how many pictures had less than three quarters of those of the one before (`drops`), and `pops`: each time that the
-picture changed while the eye held still, how far what is seen moved, pixels (median, 95 and 99 % of squares of 32 pixels, by phase
+picture changed while the eye held still, how far the picture moved, pixels (median, 95 and 99 % of squares of 32 pixels, by phase
 correlation), from one picture to the next of 30 a second, and in all. Needs python3-opencv for the pops.
 
 `modar-model-probe make SCAN TRIANGLES OUT.obj` makes a huge scan out of one; bake it with default options. Needs modar on the path,
@@ -79,7 +79,7 @@ FLY = """(async () => {
       step((now - start) / 1000 / seconds, now - before);
     }
   };
-  // What is seen while a picture fades over the models, 30 times a second.
+  // The view while a picture fades over the models, 30 times a second.
   const fade = (over) => {
     const [animation] = over.getAnimations();
     animation.pause();
@@ -119,7 +119,7 @@ FLY = """(async () => {
 
 
 class Ranged(Quiet):
-    """Files by ranges, read as they are asked for."""
+    """Files by ranges, read on request."""
 
     def do_GET(self):
         path = pathlib.Path(self.translate_path(self.path))
@@ -175,7 +175,7 @@ def ways(before, after):
 
 
 def read(url):
-    """(brightness, what is covered) of a picture."""
+    """(brightness, covered share) of a picture."""
     import cv2
     import numpy
 

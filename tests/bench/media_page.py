@@ -7,7 +7,7 @@
 
 Prints JSON:
   start_ms       from the first frame in which the picture is seen to the first one that shows the film, and to the first one in which it moves
-  edge_px        how far the corners of a film as large as the picture lie from the picture's true ones in that very frame, whose number is
+  edge_px        how far the corners of a film as large as the picture are from the picture's true ones in that very frame, whose number is
                  written into it: median, 95th percentile, greatest, the share within half a pixel, and each frame that is farther
                  (number, since how many drawn frames the picture is seen, distance)
   cpu_ms         of all of the browser's processes for a drawn frame: without a film, with one of 480 lines that is held (the plane's own
@@ -39,7 +39,7 @@ name = "film"
 [bake]
 loop-views = 24
 score = false
-parameters = ["none"]
+parameters = "none"
 [[pattern]]
 file = "cover.png"
 [[scene]]
@@ -86,7 +86,7 @@ WATCH = """(async () => {
 })()"""
 
 
-# For any engine: looks around, holds the film, and posts a pixel of the plane's middle beside the film's.
+# For any engine: looks around, holds the film, and posts a pixel of the plane's middle next to the film's.
 PROBE = """const part = (id) => document.getElementById(id) ?? document.querySelector('modar-viewer').shadowRoot.getElementById(id);
 const sleep = (ms) => new Promise((resolve) => { setTimeout(resolve, ms); });
 const pixelOf = (source, x, y) => {

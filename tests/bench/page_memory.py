@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Memory that a visit takes for a bundle, in Chromium: of all of its processes, beside what a blank page takes.
+"""Memory that a visit takes for a bundle, in Chromium: of all of its processes, next to what a blank page takes.
 
     page_memory.py BUNDLE [--raw | --packed] [--page FOLDER] [--small BUNDLE] [--mbit N]
 

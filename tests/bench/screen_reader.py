@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a screen reader is told of a page: the tree of AT-SPI, as Orca reads it, of the cover and of the turntable, in WebKitGTK and Firefox.
+"""Announcements of a screen reader on a page: the tree of AT-SPI, as Orca reads it, of the cover and of the turntable, in WebKitGTK and Firefox.
 
     screen_reader.py BUNDLE     makes a page of the bundle; prints a line for each thing: role, name, description, states
 Needs MODAR_BIN (build/release/bin by default) and a bus of its own: `dbus-run-session -- tests/bench/screen_reader.py BUNDLE`. Debian's packages
@@ -22,7 +22,7 @@ from browser import Server, engines  # noqa: E402
 
 BIN = pathlib.Path(os.environ.get("MODAR_BIN", ROOT / "build/release/bin"))
 STATES = {pyatspi.STATE_FOCUSABLE: "focusable", pyatspi.STATE_CHECKED: "checked", pyatspi.STATE_PRESSED: "pressed", pyatspi.STATE_MODAL: "modal"}
-# Without a camera; after a while the page goes on to the turntable.
+# Without a camera; after a while the page continues to the turntable.
 GO_ON = "setTimeout(() => document.getElementById('look').click(), 15000);"
 
 

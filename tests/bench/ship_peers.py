@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Bytes on the way beside other programs, in one run.
+"""Bytes on the way next to other programs, in one run.
 
     ship_peers.py size MODEL.obj...      a first download, against gltfpack -cc and the same ETC1 under zstd-19
     ship_peers.py delta OLD.modar NEW.modar   an update, against casync and zchunk

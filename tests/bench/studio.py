@@ -7,7 +7,7 @@ Prints JSON, medians in ms: first_page (an empty folder, until its first screen 
 browser's own share), open (a baked project of 200 models and 100
 pictures, until its cards are there), scroll_frame (while that list is scrolled from end to end, and its models are drawn), corner (a
 dragged corner, until the rectified preview is drawn) and handle (a dragged handle, until the model is drawn: the event's own time);
-corner_worst and handle_worst are the worst. changed: from a model that is written by hand until the stage draws it, less the bake's own time as its event tells it.
+corner_worst and handle_worst are the worst. changed: from a model that is written outside the page until the stage draws it, less the bake's own time as its event tells it.
 
 Needs a release build's modar in MODAR_BIN_DIR (default: build/release/bin), chromium, and the page's engine (preset `web`).
 """
@@ -31,8 +31,8 @@ from studio import Studio  # noqa: E402
 from studio_test import WATCH, wall  # noqa: E402
 
 # A bake in seconds: the page shows what there is, whatever it took.
-QUICK = '[bake]\nloop-views = 8\nscore = false\nlods = 1\nparameters = ["none"]\n\n'
-# When what is waited for was drawn: looked at in the page, at each of its frames.
+QUICK = '[bake]\nloop-views = 8\nscore = false\nlods = 1\nparameters = "none"\n\n'
+# When the awaited state was drawn: looked at in the page, at each of its frames.
 PAINTED = """(() => {{
   const look = () => requestAnimationFrame(() => {{
     if ({ready}) setTimeout(() => {{ globalThis.paintedBy = performance.now(); }});
@@ -64,7 +64,7 @@ def opened(folder, project, ready, page="?lang=en"):
 
 
 def first_pages(folder, runs):
-    """Medians of the first screen, and of its words alone, a text that the browser shows as it is; in turns."""
+    """Medians of the first screen, and of its words alone, a text that the browser shows without processing; in turns."""
     taken = []
     for i in range(2 * runs):
         ready, page = ("document.querySelector('.welcome')", "?lang=en") if i % 2 else ("document.body", "words/en.json")
@@ -167,7 +167,7 @@ def main():
         wall(project / "wall.jpg")
         for name in ("pottery.obj", "pottery.mtl", "pottery.png"):
             shutil.copy(POTTERY.with_name(name), project)
-        (project / "modar.toml").write_text('[[model]]\nfile = "pottery.obj"\n\n[[pattern]]\nfile = "wall.jpg"\nwidth-mm = 297\n'
+        (project / "modar.toml").write_text('[[model]]\nfile = "pottery.obj"\n\n[[pattern]]\nfile = "wall.jpg"\nwidth = "297mm"\n'
                                             'corners = [[300, 160], [1350, 160], [1350, 1000], [300, 1000]]\n\n[[scene]]\npattern = "wall"\nmodel = "pottery"\n')
         studio, hand, _ = opened(folder, project, "document.querySelectorAll('.cards li').length === 2")
         hand.run(WATCH)

@@ -126,18 +126,18 @@ TEST(Device, TexturesTakeTheirHalfFromTheCoarsestLevels) {
 
 TEST(Verdict, CountsAllButListsTwentyOfAKind) {
   Verdict verdict;
-  const IssueKind& kind = workstation_issue_kind(WorkstationRule::kDeviceEtc1);
+  const IssueKind& kind = workstation_issue_kind(WorkstationRule::kDeviceGpuDetail);
   for (int i = 0; i < 50; ++i) verdict.add({&kind, "texture", 0, ""});
   EXPECT_TRUE(verdict.good());
   EXPECT_EQ(verdict.warnings(), 50u);
   EXPECT_EQ(verdict.issues().size(), 20u);
-  EXPECT_EQ(verdict.left_out().at("DEVICE_ETC1"), 30u);
+  EXPECT_EQ(verdict.left_out().at("DEVICE_GPU_DETAIL"), 30u);
   Verdict strict;
   strict.set_warnings_as_errors();
   strict.add({&kind, "texture", 0, ""});
   EXPECT_FALSE(strict.good());
   Verdict deaf;
-  ASSERT_TRUE(deaf.override_severity("DEVICE_ETC1=ignore"));
+  ASSERT_TRUE(deaf.override_severity("DEVICE_GPU_DETAIL=ignore"));
   deaf.add({&kind, "texture", 0, ""});
   EXPECT_TRUE(deaf.issues().empty());
 }

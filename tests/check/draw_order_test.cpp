@@ -1,4 +1,4 @@
-// What is seen through, drawn by the renderer from a baked bundle, against each pixel's layers
+// Transparent parts, drawn by the renderer from a baked bundle, against each pixel's layers
 // sorted by brute force.
 #include <unistd.h>
 
@@ -90,7 +90,7 @@ glm::dvec3 layers(const TriMesh& mesh, const glm::dvec3& eye, const glm::dvec3& 
   return colour;
 }
 
-/// Light that leaves colours as they are stored.
+/// Light that leaves stored colours unchanged.
 RenderOptions plain_light() {
   RenderOptions options;
   options.light = RoomLight{};

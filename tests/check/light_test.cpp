@@ -88,7 +88,7 @@ TEST(LightImage, ASmoothRoomBecomesItsIrradiance) {
     return sky_at(*light, n) +
            static_cast<double>(light->key[0]) * std::max(0.0, glm::dot(n, to_key));
   };
-  // Scaled as a whole, so that only ratios are told.
+  // Scaled as a whole, so that only ratios are known.
   for (const glm::dvec3& n :
        {glm::dvec3(1, 0, 0), {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0.6, 0, 0.8}, {0, 0, -1}}) {
     EXPECT_NEAR(all(n) / all(up), irradiance(room, n) / irradiance(room, up), 0.03)

@@ -1,13 +1,13 @@
 // The proof of the checker is worth something only if its mutations reach everything.
-#include "bake/lab/mutate.hpp"
+#include "bake/extensions/lab/mutate.hpp"
 
 #include <gtest/gtest.h>
 
 #include <set>
 #include <string>
 
-#include "bake/lab/mutator.hpp"
-#include "bake/lab/scene_digest.hpp"
+#include "bake/extensions/lab/mutator.hpp"
+#include "bake/extensions/lab/scene_digest.hpp"
 #include "formats/check.hpp"
 #include "formats/content_summary.hpp"
 #include "tests/formats/support.hpp"
@@ -23,7 +23,7 @@ Bytes summarised_bundle() {
   BundleContent content = golden_content();
   add_looks(content);
   add_nodes(content);
-  add_stand_ins(content);
+  add_proxies(content);
   content.summary = content_summary_of(content);
   return encode(content);
 }

@@ -1,4 +1,4 @@
-// Relief that is drawn into base colours, against the renderer's own shading of surfaces that lie
+// Relief that is drawn into base colours, against the renderer's own shading of surfaces that are
 // as a normal map says.
 #include <algorithm>
 #include <array>
@@ -198,7 +198,7 @@ TEST_F(Relief, IsExportedAsBrightThoughFilesHoldNoFactorAboveOne) {
     most = std::max(most, pixels.pixels[i]);
   }
   EXPECT_GE(most, 253);
-  // As the device shows them beside each other.
+  // As the device shows them next to each other.
   TriMesh mesh = square("grey.png", "normal.png");
   ASSERT_TRUE(draw_relief(mesh, {}, report_));
   const std::vector<std::uint8_t> grey = picture_of(mesh).pixels;

@@ -1,24 +1,24 @@
-"""Scenes that act: pictures, labels and actions from modar.toml to the bundle, and what is refused before the bake."""
+"""Scenes that act: pictures, labels and actions from modar.toml to the bundle, and refusals before the bake."""
 import json
 import os
 import shutil
 import subprocess
 import unittest
 
-from programs import ROOT, ProgramTest, picture
+from programs import ROOT, ProgramTest, picture, needs
 
 HEAD = """[bake]
 loop-views = 8
 score = false
 lods = 1
-parameters = ["none"]
+parameters = "none"
 occlusion = false
 shadows = false
 [[model]]
 file = "pot.obj"
 [[pattern]]
 file = "cover.png"
-width-mm = 144
+width = "144mm"
 """
 SCENE = """[[scene]]
 pattern = "cover"
@@ -159,12 +159,12 @@ class Acting(ProgramTest):
                                          capture_output=True, text=True, check=True).stdout)["streams"]
         self.assertEqual([(each["codec_name"], each.get("profile")) for each in said],
                          [("h264", "Constrained Baseline"), ("aac", "LC")])
-        # It is fit already: as it is, and the same bundle again but for the poster and names.
+        # It is fit already and stays unchanged, as does the bundle again but for the poster and names.
         shutil.move(self.folder / "taken.mp4", self.folder / "film.mp4")
         before = bundle.read_bytes()[at:at + media["bytes"]]
         self.assertEqual(self.bake(scene.replace("film.avi", "film.mp4")).returncode, 0)
         self.assertIn(before, bundle.read_bytes())
-        # Encoded once: what is baked anew with the same film asks FFmpeg for nothing.
+        # Encoded once: a new bake with the same film asks FFmpeg for nothing.
         self.film("other.avi", "-c:v", "mpeg4", "-c:a", "mp2")
         (self.folder / "tools").mkdir()
         (self.folder / "tools/ffmpeg").write_text(f'#!/bin/sh\necho "$@" >>{self.folder}/asked\nexec {shutil.which("ffmpeg")} "$@"\n')
@@ -198,6 +198,7 @@ class Acting(ProgramTest):
         done = self.bake(scene.replace("film.avi", "film.mp4"))
         self.assertIn("video.decode", done.stderr)
 
+    @needs("report")
     def test_a_sound_with_captions(self):
         subprocess.run(["ffmpeg", "-loglevel", "error", "-f", "lavfi", "-i", "sine=d=2:r=44100", self.folder / "voice.wav"], check=True)
         (self.folder / "voice.srt").write_text("1\n00:00:00,500 --> 00:00:01,250\n<i>This</i> pot\nis old.\n\n"
@@ -226,7 +227,7 @@ class Acting(ProgramTest):
         page = (self.folder / "report.html").read_text(encoding="utf-8")
         for words in ("This pot is old.\n[bell]", "Alter Topf &amp; Krug", "tap 1: play voice", "<td>sound</td><td>2.0 s</td>"):
             self.assertIn(words, page)
-        # Changed captions are baked again; a second language of one sound alone is told.
+        # Changed captions are baked again; a second language of one sound alone is reported.
         (self.folder / "voice.vtt").write_text("WEBVTT\n\n00:00.500 --> 00:01.250\nEin alter Topf\n")
         self.assertEqual(self.bake(scene).returncode, 0)
         self.assertIn("Ein alter Topf", self.modar("inspect", bundle, "--json").stdout)
@@ -242,6 +243,7 @@ class Acting(ProgramTest):
         (self.folder / "voice.wav").write_bytes(b"no sound")
         self.assertIn("FFmpeg reads no sound", self.bake(scene.replace('captions.de = "voice.vtt"\n', "")).stderr)
 
+    @needs("report")
     def test_what_flashes_is_told(self):
         scene = '[[scene]]\npattern = "cover"\n[[scene.video]]\nfile = "flash.mp4"\n'
         # Changes a second, and the share of the width that changes: WCAG allows three flashes, and any on less than a quarter.
@@ -268,6 +270,8 @@ class Acting(ProgramTest):
                 (('do = "show pot"', 'do = "sing"'), "project.value", 'do = "sing"'),
                 (('do = "show pot"', 'do = "turn pot by 90 around x"'), "project.value", 'do = "turn pot by 90 around'),
                 (('"link https:', '"link http:'), "project.value", 'do = "link'),
+                (('"link https://', '"link https://museum.org@'), "user name", 'do = "link'),
+                (('"link https://', '"link https://\u202e'), "invisible", 'do = "link'),
                 (('on = "found"', 'on = "fund"'), "project.value", 'on = "fund"'),
                 (('on = "found"', 'on = "found"\npart = "lid"'), "project.value", 'part = "lid"'),
                 (('on = "tap rim"', 'on = "tap rim"\npart = "lid"'), "action.part", 'do = "next map"'),

@@ -1,4 +1,4 @@
-"""What is installed: programs that run from there; the libraries, found by CMake and pkg-config; their headers."""
+"""Installed files: programs that run from there; the libraries, found by CMake and pkg-config; their headers."""
 import csv
 import math
 import os
@@ -55,7 +55,8 @@ int main(int argc, char** argv) {
   modar_renderer* renderer = modar_renderer_create(bundle, argv[2], 0, &e);
   if (!renderer || modar_renderer_resize(renderer, 64, 48, &e)) return 17;
   modar_item items[2] = {{.size = sizeof(modar_item), .to_eye = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -4, 1}}, {.size = sizeof(modar_item), .model = 99}};
-  modar_renderer_render(renderer, NULL, &camera, NULL, items, 2);
+  modar_drawing drawing = {.size = sizeof drawing, .camera = &camera, .items = items, .item_count = 2};
+  modar_renderer_render(renderer, NULL, &drawing);
   modar_renderer_read_rgba(renderer, rgba);
   modar_render_stats stats = {.size = sizeof stats};
   modar_renderer_stats(renderer, &stats);
@@ -92,7 +93,8 @@ int main(int argc, char** argv) {
     items[count] = (modar_item){.size = sizeof items[0]};
     modar_item_place(&items[count], &scene, &pose);
   }
-  modar_renderer_render(renderer, NULL, &camera, NULL, items, count);
+  modar_drawing drawing = {.size = sizeof drawing, .camera = &camera, .items = items, .item_count = count};
+  modar_renderer_render(renderer, NULL, &drawing);
   modar_renderer_read_rgba(renderer, rgba);
   modar_render_stats stats = {.size = sizeof stats};
   modar_renderer_stats(renderer, &stats);
@@ -160,7 +162,9 @@ class App(ProgramTest):
         self.assertGreater(sum(middle) / len(middle), 20, f"the model of frame {frame}")
 
     def test_the_example_of_forty_lines(self):
-        self.assertLessEqual(len((ROOT / "runtime" / "example" / "overlay.c").read_text().splitlines()), 40)
+        example = (ROOT / "runtime" / "example" / "overlay.c").read_text()
+        self.assertLessEqual(len(example.splitlines()), 40)
+        self.assertIn(f"```c\n{example}```", (ROOT / "runtime" / "README.md").read_text(), "the guide shows the program")
         overlay, bundle = self.build_example(), self.bake_demo()
         self.assertEqual(run(overlay).returncode, 1)
         # A program that gives up leaves its memory to the system.
@@ -281,7 +285,7 @@ class App(ProgramTest):
         self.assertEqual(done.returncode, 0, done.stderr)
 
         def place(x, y):
-            """By hand: pinhole, a quarter turn, the scale, the crop; GL's rows go up."""
+            """Run manually: pinhole, a quarter turn, the scale, the crop; GL's rows go up."""
             eye = [row[0] * x + row[1] * y + row[3] for row in to_eye]
             u, v = 75.5 + 150 * eye[0] / -eye[2], 66.5 - 140 * eye[1] / -eye[2]
             return 9 + 1.5 * (120 - v) - 15, 4 + 240 - 1.5 * u
@@ -319,7 +323,7 @@ class App(ProgramTest):
 
     def assert_asks_of_c(self, bundle, phone):
         truth, nv21, _ = self.clip()
-        asset = self.folder / "app.apk"  # an asset lies at a multiple of 4
+        asset = self.folder / "app.apk"  # an asset is at a multiple of 4
         asset.write_bytes(b"x" * 12 + bundle.read_bytes() + b"tail")
         done = run(phone, asset, 12, bundle.stat().st_size, WIDTH, HEIGHT, input=nv21)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -332,7 +336,7 @@ class App(ProgramTest):
         self.assertTrue(0.3 < fit <= 1, fit)
         x, y = (WIDTH * place[i] / place[2] + (side - 1) / 2 for i, side in enumerate((WIDTH, HEIGHT)))
         self.assertLess(abs(x - diagonals(truth[-1])[0]) + abs(y - diagonals(truth[-1])[1]), 3)
-        # The tap went to the pattern's middle, on which the model lies.
+        # The tap went to the pattern's middle, on which the model is.
         distance, *point = (float(word) for word in pick[1:])
         self.assertAlmostEqual(distance, math.hypot(*place), delta=0.01)
         self.assertLess(math.hypot(*point), 0.01)

@@ -18,7 +18,7 @@ except ImportError:
 from programs import COVER, POTTERY, QUICK, ROOT, ProgramTest, picture, write_png
 
 OURS = json.loads((ROOT / "bake" / "commands" / "check.schema.json").read_text())
-PROOF = json.loads((ROOT / "bake" / "lab" / "mutation.schema.json").read_text())
+PROOF = json.loads((ROOT / "bake" / "extensions" / "lab" / "mutation.schema.json").read_text())
 SARIF = json.loads((ROOT / "tests" / "cli" / "sarif.schema.json").read_text())
 CORRUPT = sorted((ROOT / "tests" / "corrupt").glob("*.modar"))
 GOLDEN = ROOT / "tests" / "golden" / "v1_0.modar"
@@ -166,7 +166,7 @@ class Check(ProgramTest):
             picture(self.folder / f"{name}.png", 144, 108 if name == "card" else 120, mirrored=name == "two")
         (self.folder / "other").mkdir()
         shutil.copy(self.folder / "two.png", self.folder / "other/one.png")
-        fast = ["--loop-views", 8, "--no-score", "--no-lods", "--no-ao", "--no-shadows", "--quiet"]
+        fast = ["--loop-views", 8, "--no-score", "--no-lods", "--no-occlusion", "--no-shadows", "--quiet"]
         baked = {}
         for light in ("one", "two", "card"):
             baked[light] = self.folder / f"lit-{light}.modar"

@@ -4,7 +4,7 @@ import shutil
 import subprocess
 import unittest
 
-from programs import ProgramTest
+from programs import ProgramTest, needs
 
 
 class Document(ProgramTest):
@@ -31,6 +31,7 @@ class Document(ProgramTest):
                 self.assertIn(option, page)
         self.assertIn("A to E", (self.share / "man/man1/modar-pattern-score.1").read_text())
 
+    @needs("web")
     def test_help_is_short_and_help_all_is_whole(self):
         def listed(*words):
             """The commands or options of a help text."""
@@ -73,7 +74,7 @@ class Document(ProgramTest):
     def test_bash_completes(self):
         self.assertIn("pattern", self.complete("modar", "pat"))
         self.assertEqual(self.complete("modar", "pattern", "rec"), ["rectify"])
-        self.assertIn("--width-mm", self.complete("modar", "pattern", "rectify", "--wi"))
+        self.assertIn("--width", self.complete("modar", "pattern", "rectify", "--wi"))
         self.assertEqual(self.complete("modar", "bake", "--effort", "b"), ["best"])
         (self.folder / "vase.obj").touch()
         (self.folder / "patio").touch()

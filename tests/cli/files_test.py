@@ -6,7 +6,7 @@ import struct
 import subprocess
 import unittest
 
-from programs import BIN, COVER, POTTERY, ROOT, STATUE, ProgramTest, picture
+from programs import BIN, COVER, POTTERY, ROOT, STATUE, ProgramTest, picture, needs
 
 GAME = COVER.parent / "game.png"
 
@@ -53,6 +53,7 @@ class Inputs(ProgramTest):
                                               "-o", output))
             self.assert_kept(path, self.modar("calibrate", path, "--board", "9x6", "-o", output))
 
+    @needs("report")
     def test_files_of_other_kinds_stay(self):
         bundle = self.bake_demo()
         (self.folder / "modar.toml").write_text(f"[[model]]\nfile = \"m.obj\"\n[bake]\nlods = 1\nocclusion = false\n")
@@ -166,11 +167,12 @@ class Outputs(ProgramTest):
         self.assertEqual(bundle.read_bytes(), earlier)
         self.assertEqual([p.name for p in self.folder.iterdir()], ["out.modar"])
 
+    @needs("web")
     def test_a_full_disk_leaves_no_part_of_a_folder(self):
         bundle = self.bake_demo()
         out = self.folder / "out"
         blocks = 200  # of 512 bytes: less than the largest file
-        for words in (["inspect", bundle, "--extract", out], ["web", bundle, "-o", out, "--page", ROOT / "runtime/web"]):
+        for words in (["inspect", bundle, "--extract", out], ["web", bundle, "-o", out, "--page", ROOT / "runtime/extensions/web"]):
             self.assert_fails(self.on_full_disk(blocks, *words), 2, "out/")
             self.assertFalse(out.exists(), words)
         self.assertEqual(self.modar("inspect", bundle, "--extract", out).returncode, 0)
@@ -191,7 +193,7 @@ class Outputs(ProgramTest):
 
 
 class OtherFiles(ProgramTest):
-    """What is no model, picture or bundle is called what it is, and nothing is written."""
+    """Files other than models, pictures and bundles are named by their kind, and nothing is written."""
 
     def test_pictures_that_are_not_read_name_what_converts_them(self):
         for name, start, tool in (("photo.heic", b"\0\0\0\x18ftypheic\0\0\0\0mif1heic", "heif-convert"),
@@ -208,9 +210,10 @@ class OtherFiles(ProgramTest):
         for flag in ("--model", "--pattern"):
             self.assert_fails(self.modar("bake", flag, "spot", "-o", "out.modar"), 2, "spot", "folder")
 
+    @needs("web")
     def test_files_that_are_no_bundle_are_named_and_leave_no_page(self):
         (self.folder / "text.modar").write_text(9 * "no bundle ")
-        for words in (["web", "text.modar", "-o", "site", "--page", ROOT / "runtime/web"], ["report", "text.modar", "-o", "page.html"], ["inspect", "text.modar"]):
+        for words in (["web", "text.modar", "-o", "site", "--page", ROOT / "runtime/extensions/web"], ["report", "text.modar", "-o", "page.html"], ["inspect", "text.modar"]):
             self.assert_fails(self.modar(*words), 3, "text.modar", "bundle.magic")
         self.assertEqual([path.name for path in self.folder.iterdir()], ["text.modar"])
 

@@ -10,10 +10,10 @@ SEEN, GONE, AGAIN = 10, 40, 25  # frames with the cover, without it, and with it
 PROJECT = """[bake]
 loop-views = 8
 score = false
-parameters = ["none"]
+parameters = "none"
 [[pattern]]
 file = "cover.png"
-width-mm = 144
+width = "144mm"
 [[scene]]
 pattern = "cover"
 [[scene.video]]
@@ -34,12 +34,12 @@ do = "link https://museum.org/cover"
 
 
 def bake_film(test):
-    """The bundle; film.mp4 lies beside it. Each picture has one colour, no two that follow are alike."""
+    """The bundle; film.mp4 is next to it. Each picture has one colour, no two that follow are alike."""
     shutil.copy(COVER, test.folder / "cover.png")
     (test.folder / "modar.toml").write_text(PROJECT)
     (test.folder / "film.vtt").write_text("WEBVTT\n\n00:00.100 --> 00:00.300\n<i>One</i> &amp; only\n")
     pictures = b"".join(bytes((60 + 9 * i, 200 - 8 * i, 90 + 60 * (i % 3))) * 64 * 64 for i in range(FILM_FRAMES))
-    # Fit as it is, so that its bytes are the bundle's.
+    # Fit already, so that its bytes are the bundle's.
     subprocess.run(["ffmpeg", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", "64x64", "-r", str(FILM_FPS), "-i", "-",
                     "-f", "lavfi", "-i", f"sine=f=440:r=44100:d={FILM_FRAMES / FILM_FPS}", "-c:v", "libx264", "-profile:v", "baseline",
                     "-pix_fmt", "yuv420p", "-crf", "12", "-c:a", "aac", "-movflags", "+faststart", test.folder / "film.mp4"],

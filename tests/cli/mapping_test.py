@@ -4,12 +4,13 @@ import shutil
 import subprocess
 import unittest
 
-from programs import BIN, COVER, ProgramTest
+from programs import BIN, COVER, ProgramTest, needs
 
 CALLS = "openat,open,mmap,read,pread64,readv,preadv,preadv2,sendfile,copy_file_range,close"
 
 
 class Mapping(ProgramTest):
+    @needs("paper")
     def test_the_bundle_is_mapped_and_not_read(self):
         if shutil.which("strace") is None:
             self.skipTest("no strace here")

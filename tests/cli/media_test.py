@@ -1,4 +1,4 @@
-"""Videos and sounds in the player: its log of commands, pixels against FFmpeg's own decoder, and what is heard."""
+"""Videos and sounds in the player: its log of commands, pixels against FFmpeg's own decoder, and the sound."""
 import array
 import json
 import math
@@ -40,7 +40,7 @@ class Media(ProgramTest):
         log = {first: ["play film"], first + 8: ["text note"], lost: ["link https://museum.org/cover", "pause film"],
                again: ["play film"], again + 8: ["text note"]}
         self.assertEqual({i: line["commands"] for i, line in enumerate(lines) if "commands" in line}, log)
-        # Where the film is: it goes on for the second of grace, waits while the cover is gone, and stays at its end.
+        # Where the film is: it continues for the second of grace, waits while the cover is gone, and stays at its end.
         length = FILM_FRAMES / FILM_FPS
         at = [min(length, (min(i, lost) - first) / FPS + max(0, i - again) / FPS) for i in range(len(lines))]
         self.assertEqual(at[-1], length)
@@ -72,8 +72,6 @@ class Media(ProgramTest):
         file.unlink(missing_ok=True)
         env = {"SDL_AUDIODRIVER": "disk", "SDL_DISKAUDIOFILE": str(file)}
         told = self.play("--realtime", "--quiet", *words, env={**os.environ, **env})[1]
-        if "sound.unsupported" in told:
-            self.skipTest("no libavformat-dev, libavcodec-dev: this player is silent")
         if not file.exists():
             return 0, 0
         samples = array.array("f", file.read_bytes())[::2]

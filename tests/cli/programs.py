@@ -18,6 +18,13 @@ BIN = pathlib.Path(os.environ.get("MODAR_BIN_DIR", ROOT / "build" / "dev" / "bin
 POTTERY = ROOT / "assets" / "models" / "pottery.obj"
 STATUE = ROOT / "assets" / "models" / "statue.obj"
 COVER = ROOT / "assets" / "patterns" / "cover.png"
+EXTENSIONS = os.environ.get("MODAR_EXTENSIONS", "web,report,studio,lab,paper,android").split(",")
+
+
+def needs(extension):
+    """Skips a test where CMake built without the extension."""
+    return unittest.skipUnless(extension in EXTENSIONS, f"built without the extension {extension}")
+
 
 
 # The clip of demo_files(); in one frame the cover is gone.
@@ -29,7 +36,7 @@ SEEN, COVERED = 18, 8
 TURNS = [[Random(3 * i + axis).randrange(-8, 9) / 4096 for axis in range(3)] for i in range(SEEN + COVERED)]
 
 # A gyroscope's readings, [milliseconds, degrees a second]: rising by one a millisecond; half a second later two more. By how many
-# degrees it turned in some spans, by hand: the area under straight lines, the last reading for at most 100 ms more.
+# degrees it turned in some spans, by geometry: the area under straight lines, the last reading for at most 100 ms more.
 READINGS = [[10 * i, 10 * i] for i in range(1, 11)] + [[600, 50], [610, 50]]
 TURNED = {(15, 95): 4.4, (25, 35): 0.3, (105, 150): 4.5, (605, 655): 2.5, (5, 50): None, (50, 400): None, (300, 609): None,
           (605, 711): None}
@@ -57,7 +64,7 @@ def picture(path, width=200, height=150, mirrored=False):
 
 
 def covered_clip(path, width=640, height=480):
-    """Gray frames of our cover on a wall that the camera goes along; in the last COVERED of them something lies over the cover."""
+    """Gray frames of our cover on a wall that the camera goes along; in the last COVERED of them something is over the cover."""
     wall = path.with_suffix(".wall")
     columns, rows = width * 3 // 16, height * 5 // 32
     wall.write_bytes(Random(7).randbytes(columns * rows))
@@ -85,7 +92,7 @@ def make_demo_files(folder):
 
 @functools.cache
 def demo_files():
-    """The folder that CTest's demo_files filled for all tests; for a test that is run by hand, one of its own."""
+    """The folder that CTest's demo_files filled for all tests; for a test that is run manually, one of its own."""
     if "MODAR_DEMO_FILES" in os.environ:
         return pathlib.Path(os.environ["MODAR_DEMO_FILES"])
     folder = pathlib.Path(tempfile.mkdtemp(prefix="modar-demo-"))
@@ -95,7 +102,7 @@ def demo_files():
 
 
 def demo_clip(folder, frames=CLIP_FRAMES):
-    """frame_*.png and truth.csv as make_clip.py writes them: so many frames around the one without the cover."""
+    """frame_*.png and truth.csv as make_clip.py writes them: a number of frames around the one without the cover."""
     first, clip = CLIP_GONE - frames // 2, demo_files() / "clip"
     truth = (clip / "truth.csv").read_text().splitlines(keepends=True)
     folder.mkdir()
@@ -113,7 +120,7 @@ name = "demo"
 loop-views = 8
 score = false
 lods = 1
-parameters = ["none"]
+parameters = "none"
 [[model]]
 file = "pottery.obj"
 [[pattern]]
@@ -122,6 +129,25 @@ file = "cover.png"
 pattern = "cover"
 model = "pottery"
 """
+
+
+def mount_fat(test):
+    """The folder of a FAT file system, which has no links and no permissions, or skips the test."""
+    image, mount = test.folder.with_name(test.folder.name + ".img"), test.folder.with_name(test.folder.name + "-fat")
+    made = shutil.which("mkfs.vfat", path="/sbin:/usr/sbin:/bin:/usr/bin")
+    if not made:
+        test.skipTest("mkfs.vfat is not installed")
+    mount.mkdir()
+    test.addCleanup(mount.rmdir)
+    test.addCleanup(image.unlink)
+    with open(image, "wb") as file:
+        file.truncate(64 << 20)
+    subprocess.run([made, image], check=True, capture_output=True)
+    ways = [["mount", "-o", "loop", image, mount], ["fusefat", "-o", "rw+", image, mount]]
+    if not any(shutil.which(way[0]) and subprocess.run(way, capture_output=True).returncode == 0 for way in ways):
+        test.skipTest("no right to mount a FAT image, and fusefat is not installed or fails")
+    test.addCleanup(subprocess.run, ["umount", mount])
+    return mount
 
 
 class ProgramTest(unittest.TestCase):

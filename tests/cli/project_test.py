@@ -1,22 +1,25 @@
-"""Projects: modar.toml, what of it is baked again and what is not, the cache, `modar init`."""
+"""Projects: modar.toml, the parts that are baked again, the cache, `modar init`."""
+import base64
 import json
 import os
 import pathlib
 import shutil
 import signal
+import struct
 import subprocess
 import time
 import tomllib
 import unittest
 
-from programs import BIN, COVER, POTTERY, ROOT, STATUE, ProgramTest, picture
+from programs import BIN, COVER, POTTERY, ROOT, STATUE, ProgramTest, picture, needs
 
 SCHEMA = json.loads((ROOT / "bake/project/modar.schema.json").read_text())
 # Few views of a pattern, no scores, one level: enough for tests.
-LIT = "loop-views = 8\nscore = false\nlods = 1\nparameters = [\"none\"]\n"
+LIT = "loop-views = 8\nscore = false\nlods = 1\nparameters = \"none\"\n"
 FAST = LIT + "occlusion = false\nshadows = false\n"
 LIT_DIRECT = ["--loop-views", "8", "--no-score", "--no-lods", "--parameters", "none", "--quiet"]
-DIRECT = [*LIT_DIRECT, "--no-ao", "--no-shadows"]
+KEEP = "[[bundle]]\nname = \"museum\"\nmodels = \"*\"\npatterns = \"*\"\n"
+DIRECT = [*LIT_DIRECT, "--no-occlusion", "--no-shadows"]
 
 CUBE = """mtllib cube.mtl
 v 0 0 0
@@ -48,13 +51,18 @@ class ProjectTest(ProgramTest):
         self.write("[bake]\n" + FAST + "[[model]]\nfile = \"models/*.obj\"\n[[pattern]]\nfile = \"pictures/*\"\n")
 
     def write(self, text):
-        (self.place / "modar.toml").write_text(text)
+        """Most tests bake models that no pattern shows: where the text says nothing of bundles, all are kept."""
+        keep = "" if any(table in text for table in ("[[scene]]", "[[bundle]]", "[project]")) else KEEP
+        (self.place / "modar.toml").write_text(text + keep)
 
     def bake(self, *arguments, cwd=None):
         done = self.modar("bake", "--json", *arguments, cwd=cwd or self.place)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.told = done.stderr
         return json.loads(done.stdout)
+
+    def never_shown(self, *words):
+        return [finding["message"] for finding in self.bake(*words)["findings"] if finding["id"] == "project.never-shown"]
 
     def states(self, report):
         return {asset["name"] + asset["tier"]: asset["state"] for asset in report["assets"]}
@@ -72,7 +80,7 @@ class Files(ProjectTest):
         cover = self.folder / "cover.png"
         picture(cover)
         self.write("[project]\nname = \"both\"\n[bake]\n" + LIT + f"[[model]]\nfile = \"{STATUE}\"\n"
-                   f"[[model]]\nfile = \"{POTTERY}\"\n[[pattern]]\nfile = \"{cover}\"\nwidth-mm = 210\n"
+                   f"[[model]]\nfile = \"{POTTERY}\"\n[[pattern]]\nfile = \"{cover}\"\nwidth = \"210mm\"\n"
                    "[[scene]]\npattern = \"cover\"\nmodel = \"pottery\"\nup = \"y\"\nscale = 0.8\noffset = [0, 0.1, 0]\n"
                    f"light = \"{cover}\"\n"
                    "[[bundle]]\nname = \"one\"\npatterns = \"cov*\"\n")
@@ -147,7 +155,7 @@ class Files(ProjectTest):
             ("[bake]\nmipmaps = 1\n", "modar.toml:2", "true or false", "project.value"),
             ("[bake]\ndevice = \"ace3\"\n", "modar.toml:2", "ace2", "project.value"),
             ("[[model]]\nfile = \"*.fbx\"\n", "modar.toml:2", "'*.fbx'", "project.no-match"),
-            ("[[model]]\nwidth-mm = 3\n", "modar.toml:2", "there is no key 'width-mm'", "project.key"),
+            ("[[model]]\nwidth = 3\n", "modar.toml:2", "there is no key 'width'", "project.key"),
             ("[[model]]\nfile = [\"models/a.obj\", \"models/a.obj\"]\n", "modar.toml:2", "'a'", "project.same-name"),
             ("[[pattern]]\nfile = \"pictures/a.png\"\n[[scene]]\npattern = \"aa\"\n", "modar.toml:4", "did you mean 'a'",
              "project.scene-unknown"),
@@ -187,7 +195,7 @@ class Files(ProjectTest):
         head = "[[model]]\nfile = \"models/*.obj\"\n[[pattern]]\nfile = \"pictures/*\"\n"
         for text in ("[bake]\nmax-texture = 3", "[bake]\nmax-texture = 8192", "[bake]\nlods = 13", "[bake]\nlods = 12",
                      "[bake]\nloop-views = 0", "[bake]\nunit = \"ell\"", "[bake]\nunit = \"ft\"", "[bake]\nscore = \"no\"",
-                     "[bake]\nparameters = \"none\"", "[bake]\nparameters = 4", "[project]\nname = 3", "[bake]\nlods = 2.5",
+                     "[bake]\nparameters = [\"none\"]", "[bake]\nparameters = 4", "[project]\nname = 3", "[bake]\nlods = 2.5",
                      "[[scene]]\npattern = \"a\"\nmodel = \"a\"\nscale = 0", "[[scene]]\npattern = \"a\"\nmodel = \"a\"\nup = \"-y\"",
                      "[[scene]]\npattern = \"a\"\nmodel = \"a\"\noffset = [1, 2]", "[[tier]]\nlods = 1",
                      "[[bundle]]\npatterns = \"a\"", "[gates]\nmin-psnr = -1", "[gates]\nmin-psnr = 30"):
@@ -344,16 +352,42 @@ class Strangers(ProjectTest):
         (self.place / ".modar").symlink_to(self.folder / "others")
         self.refused(self.table(), "project.outside")
 
-    def test_textures_stay_in_the_folder(self):
-        outside = self.folder / "private.png"
-        shutil.copy(self.place / "models/wall.png", outside)
-        for name in ("../../private.png", str(outside)):
-            (self.place / "models/cube.mtl").write_text(CUBE_MTL.replace("wall.png", name))
-            told = self.refused(self.table(model="models/a.obj"), "project.outside", "private.png")
-            self.assertIn("--outside", told)
-        self.assertEqual([p for p in self.place.rglob("*.modar") if p.is_file()], [])
-        self.bake("--outside")
+    def test_what_models_name_outside_the_folder_is_left_out(self):
+        """Textures, material files and images, by dots, whole paths and links: a warning, and the bundle of a model without them."""
+        outside = self.folder / "private"
+        outside.mkdir()
+        shutil.copy(self.place / "models/wall.png", outside / "private.png")
+        (outside / "private.mtl").write_text(CUBE_MTL.replace("wall.png", f"{outside}/private.png"))
+        (self.place / "models/link.png").symlink_to(outside / "private.png")
+        (self.place / "models/link.mtl").symlink_to(outside / "private.mtl")
+        ply = ("ply\nformat ascii 1.0\ncomment TextureFile {}\nelement vertex 3\n" + "".join(f"property float {each}\n" for each in "xyzst") +
+               "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n3 0 1 2\n")
+        buffer = base64.b64encode(struct.pack("<9f6f", 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 0, 1, 0, 1, 1)).decode()
+        gltf = json.dumps({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+                           "buffers": [{"byteLength": 60, "uri": "data:application/octet-stream;base64," + buffer}],
+                           "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 24}],
+                           "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+                                         {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2"}],
+                           "images": [{"uri": "NAME"}], "textures": [{"source": 0}], "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+                           "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]}]}).replace("NAME", "{}")
+        cases = {"map.obj": CUBE.replace("cube.mtl", "map.mtl"), "library.obj": CUBE.replace("cube.mtl", "{}"), "scan.ply": ply, "model.gltf": gltf}
+        for file, text in cases.items():
+            kind = "mtl" if file == "library.obj" else "png"
+            for name in (f"../../private/private.{kind}", f"link.{kind}", *([] if file == "model.gltf" else [f"{outside}/private.{kind}"])):
+                (self.place / "models/map.mtl").write_text(CUBE_MTL.replace("wall.png", name))
+                (self.place / "models" / file).write_text(text.replace("{}", name))
+                self.write(self.table('name = "m"', model=f"models/{file}"))
+                for options, textures in (([], 0), (["--outside"], 1)):
+                    report = self.bake(*options)
+                    told = [one for one in report["findings"] if "outside the project's folder" in one["message"]]
+                    self.assertEqual((len(told), *({"--outside" in one["cure"] for one in told})), (1, True) if textures == 0 else (0,), (file, name, report["findings"]))
+                    self.assertEqual(len(self.modar_json("inspect", self.place / "out/m.modar")["textures"]), textures, (file, name))
+        shutil.copy(outside / "private.png", self.place / "models")  # as the warning says
+        (self.place / "models/model.gltf").write_text(gltf.replace("{}", "../../private/private.png"))
+        self.bake()
+        self.assertEqual(len(self.modar_json("inspect", self.place / "out/m.modar")["textures"]), 1)
 
+    @needs("report")
     def test_pipes_are_no_inputs(self):
         def piped(name):
             path = self.place / name
@@ -631,20 +665,67 @@ class Plan(ProjectTest):
         self.assertEqual((self.place / "out/museum.modar").read_bytes(), by_ninja)
         shutil.copy(self.place / "models/a.obj", self.place / "models/c.obj")
         self.ninja()
-        self.assertEqual(log.read_text().count("ran"), 5)  # the third model, and the first as it was
+        self.assertEqual(log.read_text().count("ran"), 5)  # the third model, and the first unchanged
         self.assertNotEqual((self.place / "out/museum.modar").read_bytes(), by_ninja)
         self.assertIn("no work to do", self.ninja())
         (self.place / "models/c.obj").unlink()
         self.ninja()
         self.assertEqual((self.place / "out/museum.modar").read_bytes(), by_ninja)
-        (self.place / "modar.toml").touch()  # every edge runs, and the bundle stays as it is
+        (self.place / "modar.toml").touch()  # every edge runs, and the bundle stays unchanged
         self.ninja()
         self.assertIn("no work to do", self.ninja())
 
 
+class NeverShown(ProjectTest):
+    """a.obj is on a.png by its name; nothing says where b.obj is."""
+
+    def models(self):
+        return [model["name"] for model in self.modar_json("inspect", self.place / "out/museum.modar")["models"]]
+
+    def rules(self):
+        return [issue["where"] for issue in self.modar_json("check", self.place / "out/museum.modar")["issues"]
+                if issue["id"] == "NEVER_SHOWN"]
+
+    def test_models_without_a_scene_are_left_out_and_each_bake_says_so(self):
+        text = (self.place / "modar.toml").read_text().replace(KEEP, "")
+        (self.place / "modar.toml").write_text(text)
+        for words in (["--dry-run"], [], []):  # the last has nothing to do
+            self.assertEqual(self.never_shown(*words), ["no pattern shows the models b: they are left out"])
+        self.assertEqual((self.models(), self.rules()), (["a"], []))
+        self.assertFalse([name for name in self.states(self.bake()) if name == "b"])
+        self.assertNotIn("name = b", self.modar("plan", "--ninja", cwd=self.place).stdout)
+        (self.place / "modar.toml").write_text(text + "[[scene]]\npattern = \"a\"\nmodel = \"b\"\n")
+        self.assertEqual(self.never_shown(), ["no pattern shows the models a: they are left out"])
+        self.assertEqual(self.models(), ["b"])
+        (self.place / "modar.toml").write_text(text + KEEP)
+        self.assertEqual(self.never_shown(), ["no pattern shows the models b"])
+        self.assertEqual((self.models(), self.rules()), (["a", "b"], ["model 'b'"]))
+
+    def test_a_project_without_patterns_keeps_its_models(self):
+        (self.place / "modar.toml").write_text("[bake]\n" + FAST + "[[model]]\nfile = \"models/*.obj\"\n")
+        self.assertEqual(self.never_shown(), [])
+        self.assertEqual((self.models(), self.rules()), (["a", "b"], []))
+
+    def test_a_pattern_with_nothing_on_it_is_named(self):
+        picture(self.place / "pictures/bare.png", 120, 108)
+        self.assertEqual(self.never_shown(), ["no pattern shows the models b", "nothing is on the patterns bare"])
+        self.assertEqual(self.rules(), ["model 'b'", "pattern 'bare'"])
+
+    def test_a_device_gets_no_keypoints_unless_they_are_asked_for(self):
+        text = "[bake]\n" + FAST.replace("parameters = \"none\"\n", "{}") + "[[model]]\nfile = \"models/a.obj\"\n" \
+               "[[pattern]]\nfile = \"pictures/*\"\n[[tier]]\nname = \"high\"\n[[tier]]\nname = \"low\"\ndevice = \"mali400\"\n"
+        for asked, high, low in (("", ["orb-2000"], []), ("parameters = \"orb-500\"\n", ["orb-500"], ["orb-500"])):
+            (self.place / "modar.toml").write_text(text.format(asked))
+            self.assertEqual(len(self.bake()["assets"]), 3)  # the pattern is baked once
+            for tier, sets in (("high", high), ("low", low)):
+                bundle = self.place / f"out/museum-{tier}.modar"
+                self.assertEqual(list(self.modar_json("inspect", bundle)["patterns"][0]["keypoints"]), sets)
+                self.assertEqual(self.modar("check", bundle, "--source", "modar.toml", cwd=self.place).returncode, 0)
+
+
 class Watch(ProjectTest):
     def test_a_saved_file_is_baked_again(self):
-        picture(self.place / "new.png", 144, 108)  # beside modar.toml, where a bake makes folders
+        picture(self.place / "new.png", 144, 108)  # next to modar.toml, where a bake makes folders
         bundle = self.place / "out/museum.modar"
         with subprocess.Popen([BIN / "modar", "bake", "--watch"], cwd=self.place, stderr=subprocess.PIPE,
                               text=True) as baker:
@@ -703,9 +784,12 @@ class Init(ProjectTest):
         self.assertIn("textures, so no patterns: models/b.png, models/b_normal.png, models/wall.png", done.stderr)
         self.write((self.place / "modar.toml").read_text().replace("[bake]", "[bake]\nloop-views = 8\nscore = false\nocclusion = false"))
         assets = [asset["name"] for asset in self.bake("--dry-run")["assets"]]
-        self.assertEqual(sorted(assets), sorted(["a", "a", "b", "cover", "poster", "l"]))
-        idle = [finding["message"] for finding in self.bake()["findings"] if finding["id"] == "project.never-shown"]
-        self.assertEqual(idle, ["no pattern shows the models b", "nothing stands on the patterns cover, l, poster"])
+        self.assertEqual(sorted(assets), sorted(["a", "a", "cover", "poster", "l"]))
+        self.assertEqual(self.never_shown(), ["no pattern shows the models b: they are left out",
+                                              "nothing is on the patterns cover, l, poster"])
+        with open(self.place / "modar.toml", "a") as file:
+            file.write(KEEP)
+        self.assertEqual(self.never_shown()[0], "no pattern shows the models b")
         bundle = self.place / "out/museum.modar"
         textures = lambda: {texture["name"] for texture in self.modar_json("inspect", bundle)["textures"]}
         source = lambda: self.assertEqual(self.modar("check", bundle, "--source", "modar.toml", cwd=self.place).returncode, 0)
@@ -713,7 +797,8 @@ class Init(ProjectTest):
         source()
         # A project that names it as a pattern is believed.
         with open(self.place / "modar.toml", "a") as file:
-            file.write("[[pattern]]\nfile = \"models/b.png\"\n[[bundle]]\nname = \"museum\"\nmodels = \"*\"\npatterns = \"a\"\n")
+            file.write("[[pattern]]\nfile = \"models/b.png\"\n[[bundle]]\nname = \"one\"\nmodels = \"*\"\npatterns = \"a\"\n")
+        bundle = self.place / "out/one.modar"
         self.assertEqual(self.reasons()["b"], "its settings in modar.toml changed")
         self.bake()
         self.assertEqual(textures(), {"wall.png"})
@@ -725,6 +810,8 @@ class Init(ProjectTest):
         shutil.copy(self.place / "models/b.obj", self.place / "more/odd [1] \"x\".obj")
         (self.place / "modar.toml").unlink()
         self.modar("init", cwd=self.place)
+        with open(self.place / "modar.toml", "a") as file:
+            file.write(KEEP)
         report = self.bake("--dry-run")
         self.assertEqual(sorted(a["name"] for a in report["assets"]),
                          sorted(["a", "a", "b", "more", "odd [1] \"x\""]))

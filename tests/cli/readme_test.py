@@ -1,37 +1,62 @@
 """Runs the commands of README.md and the guides, in the order of each page, in one folder of small inputs."""
 import os
+import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import unittest
 
 from programs import BIN, COVER, ROOT, ProgramTest
+from web_test import ENGINES
 
 PAGES = ("README.md", "bake/README.md", "formats/README.md", "runtime/README.md", "runtime/TROUBLESHOOTING.md",
-         "runtime/web/README.md", "runtime/web/MOVING.md", "runtime/web/npm.md", "runtime/android/README.md", "bake/lab/README.md",
+         "runtime/extensions/web/README.md", "runtime/extensions/web/MOVING.md", "runtime/extensions/web/npm.md", "runtime/extensions/android/README.md", "bake/extensions/lab/README.md",
          "CONTRIBUTING.md")
 
-# What is not run here, and why. A line of a page that matches a pattern is left out; a pattern without a line is an error.
+# What no test can run: a camera, a phone, the network of others.
 NOT_RUN = (
-    (r"^scripts/(demo|test|release|setup|sources)\.sh", "installs packages and builds; CI runs them in a bare Debian 12"),
-    (r"^apt-get ", "needs root; scripts/package_try.sh"),
-    (r"^(cmake|ctest) --preset ", "builds for minutes; CI"),
-    (r"^cc overlay\.c ", "needs the installed library; app_test.py builds and runs it"),
-    (r"^modar web |^npm install ", "needs the page's engine; web_test.py, page_test.py"),
-    (r"^modar-play .* --input camera", "needs a camera; v4l2_test.cpp"),
-    (r"^modar bake --watch", "runs until Ctrl-C; project_test.py"),
-    (r"^modar studio ", "serves until Ctrl-C; tests/studio"),
-    (r"^modar plan .*srun", "needs Slurm; scripts/slurm/try.sh, project_test.py"),
-    (r"^modar-fetch http", "needs a network; ship_network_test.py"),
-    (r"^modar calibrate ", "needs a filmed pattern; calibrate_test.cpp"),
-    (r"^modar pattern (simulate|confusion) ", "takes a minute; pattern_test.py"),
-    (r"^export ANDROID_NDK=|^scripts/apk\.sh ", "needs an NDK; apk_test.py uses a compiler in its place"),
-    (r"^adb |^for phone in |^  adb |^done$", "needs a phone"),
-    (r"tests/bench/media_page\.py", "takes minutes, and a browser"),
-    (r"^scripts/tune\.py ", "takes minutes; tune_test.py"),
-    (r"^modar-lab bench (pose|wild|extended|clutter|light|model|render|lod|etc1) ", "takes minutes; the tests of bake/lab"),
+    (r"^modar-play .* --input camera", "camera"),
+    (r"^modar calibrate ", "camera"),
+    (r"^adb |^for phone in |^  adb |^done$", "phone"),
+    (r"^modar-fetch http|^npm install modar", "network"),
+    (r"^export ANDROID_NDK=|^scripts/apk\.sh ", "network"),  # of Google, for the NDK; apk_test.py makes the app without it
 )
+# What another gate of scripts/test.sh runs: the file, and its words for it.
+RUN_ELSEWHERE = (
+    (r"^scripts/demo\.sh", "scripts/newcomer.sh", "\nscripts/demo.sh"),
+    (r"^scripts/release\.sh", "scripts/newcomer.sh", "\nscripts/release.sh"),
+    (r"^scripts/test\.sh", ".ci/run", "scripts/test.sh"),
+    (r"^apt-get install \./out/release", "scripts/newcomer.sh", "block 'apt-get install'"),
+    (r"^cc overlay\.c ", "scripts/newcomer.sh", "./overlay vase.modar"),
+    (r"^apt-get install aapt ", "scripts/test.sh", "packages=(quick test web browser android)"),
+    (r"^scripts/setup\.sh (web|test)", "scripts/test.sh", "scripts/setup.sh"),
+    (r"^scripts/sources\.sh --libraries", "scripts/release.sh", "scripts/sources.sh --libraries"),
+    (r"^cmake --preset web &&", "scripts/demo.sh", "cmake --preset web"),
+    (r"^cmake --preset d(ev|evice) &&", "scripts/test.sh", "cmake --preset device"),
+    (r"^ctest --preset dev ", "scripts/test.sh", "ctest --preset dev"),
+    (r"^npm install \./build/web/web", "tests/web/package_test.py", "npm"),
+    (r"^modar studio ", "tests/studio/server_test.py", '"studio"'),
+    (r"^modar bake --watch", "tests/cli/project_test.py", '"--watch"'),
+    (r"^modar plan .*srun", "tests/cli/project_test.py", '"plan", "--ninja", "--cache"'),
+    (r"^modar pattern simulate ", "tests/cli/pattern_test.py", '"pattern", "simulate"'),
+    (r"^modar pattern confusion ", "tests/cli/pattern_test.py", '"pattern", "confusion"'),
+    (r"^scripts/tune\.py ", "tests/house/tune_test.py", "tune.py"),
+    (r"^modar-lab bench pose ", "tests/cli/pattern_test.py", '"bench", "pose"'),
+    (r"^modar-lab bench render ", "tests/cli/play_test.py", '"bench", "render"'),
+    (r"^modar-lab bench lod ", "tests/cli/bake_test.py", '"bench", "lod"'),
+    (r"^modar-lab bench light ", "scripts/demo.sh", "bench light"),
+    (r"^modar-lab bench etc1 ", "tests/lab/tables_test.cpp", "bench_etc1"),
+    (r"^modar-lab bench wild ", "tests/lab/wild_bench_test.cpp", "bench"),
+)
+# Measurements that take minutes: no gate runs them.
+LONG_BENCHES = (
+    (r"^modar-lab bench (extended|clutter|model) ", "minutes"),
+    (r"tests/bench/media_page\.py", "minutes"),
+)
+# They run until Ctrl-C.
+SERVES = re.compile(r"^modar web .*--serve\b")
 
 
 def blocks_of(page):
@@ -41,7 +66,7 @@ def blocks_of(page):
 
 
 def reason(line):
-    return next((why for pattern, why in NOT_RUN if re.search(pattern, line)), None)
+    return next((row[1] for row in NOT_RUN + RUN_ELSEWHERE + LONG_BENCHES if re.search(row[0], line)), None)
 
 
 class Readme(ProgramTest):
@@ -69,21 +94,37 @@ class Readme(ProgramTest):
         museum = self.folder / "museum"
         museum.mkdir()
         (museum / "wall.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n")
+        # The page, with empty engines.
+        shutil.copytree(ROOT / "runtime/extensions/web", self.folder / "page")
+        for name in ENGINES:
+            (self.folder / "page" / name).write_text(name)
+        (self.folder / "texts.json").write_text('{"cover": {"en": {"name": "The cover"}}}')
         (self.folder / "scripts").symlink_to(ROOT / "scripts")
         # Patterns are tried in fewer views, and not scored: that is what takes the time.
         modar = self.folder / "tools" / "modar"
         modar.parent.mkdir()
         modar.write_text('#!/bin/sh\ncase "$1 $2" in\n'
                          '"bake --model" | "bake "*.glb) set -- "$@" --loop-views 4 --no-score --parameters orb-500 ;;\n'
+                         f'"web "*) set -- "$@" --page {self.folder}/page ;;\n'
                          f'esac\nexec {BIN}/modar "$@"\n')
         modar.chmod(0o755)
         self.run_lines(["modar bake --model vase.obj --pattern cover.png -o vase.modar", "cp vase.modar old.modar",
                         "modar inspect vase.modar --extract parts", "cp parts/vase.glb vase.glb"])
 
     def run_lines(self, lines):
-        done = subprocess.run(["bash", "-exc", "\n".join(lines)], cwd=self.folder, capture_output=True, text=True,
-                              env={**os.environ, "PATH": f"{self.folder}/tools:{BIN}:{os.environ['PATH']}"})
+        environment = {**os.environ, "PATH": f"{self.folder}/tools:{BIN}:{os.environ['PATH']}"}
+        done = subprocess.run(["bash", "-exc", "\n".join(line for line in lines if not SERVES.search(line))], cwd=self.folder, capture_output=True, text=True, env=environment)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        for line in filter(SERVES.search, lines):
+            with subprocess.Popen(["bash", "-c", f"exec {line}"], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                  text=True, env=environment) as process:
+                said = ""
+                while "https://" not in said and (more := process.stdout.readline()):
+                    said += more
+                process.send_signal(signal.SIGINT)
+                said += process.stdout.read()
+            self.assertIn("https://", said)
+            self.assertIn(process.returncode, (0, -signal.SIGINT), said)
 
     def test_every_command_runs(self):
         self.prepare()
@@ -108,10 +149,17 @@ class Readme(ProgramTest):
         self.assertTrue((self.folder / "museum/out/museum.modar").exists())
         self.assertTrue((self.folder / "store/vase.modar").exists())
 
-    def test_what_is_not_run_has_a_reason_that_is_needed(self):
+    def test_what_is_not_run_needs_a_camera_a_phone_or_a_network_or_has_another_gate(self):
         lines = [line for page in PAGES for block in blocks_of(page) for line in block]
-        for pattern, why in NOT_RUN:
+        for pattern, *why in NOT_RUN + RUN_ELSEWHERE + LONG_BENCHES:
             self.assertTrue([line for line in lines if re.search(pattern, line)], f"no page has {pattern}: {why}")
+        self.assertLessEqual({why for _, why in NOT_RUN}, {"camera", "phone", "network"})
+        for _, gate, words in RUN_ELSEWHERE:
+            self.assertIn(words, (ROOT / gate).read_text(), gate)
+            # The gate is one itself: a test of CTest's, or a script that scripts/test.sh or that calls.
+            gates = [*(ROOT / "tests").rglob("CMakeLists.txt"), *(ROOT / "scripts" / name for name in ("test.sh", "newcomer.sh"))]
+            name = pathlib.PurePath(gate).stem.removesuffix("_test")
+            self.assertTrue(gate.startswith((".ci", "scripts/test.sh")) or any(name in file.read_text() for file in gates), gate)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ class Rectify(ProgramTest):
         return self.modar("pattern", "rectify", COVER, "--corners", corners, "-o", self.folder / "out.png", *more)
 
     def test_a_given_size_gives_the_aspect_ratio(self):
-        done = self.rectify("10,10,300,40,310,600,20,650", "--width-mm", "200", "--height-mm", "300")
+        done = self.rectify("10,10,300,40,310,600,20,650", "--width", "200mm", "--height", "300mm")
         self.assertEqual(done.returncode, 0, done.stderr)
         width, height = png_size(self.folder / "out.png")
         self.assertAlmostEqual(width / height, 2 / 3, delta=0.01)
@@ -28,15 +28,15 @@ class Rectify(ProgramTest):
         self.assertAlmostEqual(json.loads(frontal.stdout)["aspect"], 260 / 570, delta=0.01)
         self.assertRegex(frontal.stderr, r"width by height 0\.45\d \+- 0\.0")
         self.assertNotIn("rectify.aspect", frontal.stderr)
-        tilted = self.rectify("10,10,300,160,310,500,20,650", "--width-mm", "200")
+        tilted = self.rectify("10,10,300,160,310,500,20,650", "--width", "200mm")
         self.assertEqual(tilted.returncode, 0, tilted.stderr)
         self.assertRegex(tilted.stderr, r"rectify\.aspect")
-        self.assertIn("--height-mm", tilted.stderr)
-        measured = self.rectify("10,10,300,160,310,500,20,650", "--width-mm", "200", "--height-mm", "300")
+        self.assertIn("--height", tilted.stderr)
+        measured = self.rectify("10,10,300,160,310,500,20,650", "--width", "200mm", "--height", "300mm")
         self.assertNotIn("rectify.aspect", measured.stderr)
 
     def test_the_width_travels_with_the_image(self):
-        self.assertEqual(self.rectify("10,10,300,40,310,600,20,650", "--width-mm", "200").returncode, 0)
+        self.assertEqual(self.rectify("10,10,300,40,310,600,20,650", "--width", "200mm").returncode, 0)
         bundle = self.folder / "b.modar"
         self.assertEqual(self.modar("bake", "--pattern", "out.png", "-o", bundle, *QUICK).returncode, 0)
         self.assertAlmostEqual(self.modar_json("inspect", bundle)["patterns"][0]["width_mm"], 200, delta=0.5)

@@ -71,7 +71,7 @@ class Report(ProgramTest):
         self.assertIn(f"{inspect['models'][0]['triangles']:,}", page.words)
         self.assertIn(f"{inspect['textures'][0]['psnr_db']:.1f} dB", page.words)
         self.assertIn("Good", page.words)
-        self.assertEqual(len([i for i in page.all("img") if "standing on" in i["alt"]]), len(inspect["scenes"]))
+        self.assertEqual(len([i for i in page.all("img") if "on the pattern" in i["alt"]]), len(inspect["scenes"]))
         broken = bytearray(bundle.read_bytes())
         broken[-100] ^= 1
         bundle.write_bytes(broken)
@@ -95,7 +95,7 @@ class Report(ProgramTest):
         self.assert_fails(self.modar("report", bundle, "-o", "x.html", "--bake", "bake.json", "--quiet"), 3, "report.bake")
 
     def test_a_pattern_shows_its_grade_and_range(self):
-        picture(self.folder / "small.png")  # 200 x 150 pixels of full contrast
+        picture(self.folder / "small.png", 60, 45)
         done = self.modar("bake", "--pattern", "small.png:150mm", "-o", "b.modar", "--loop-views", "8", "--parameters", "none")
         self.assertEqual(done.returncode, 0, done.stderr)
         page = self.report(self.folder / "b.modar")

@@ -69,7 +69,7 @@ class Nginx:
 
 
 class Keeper:
-    """Serves `root`, and keeps back what is asked for while `held()`."""
+    """Serves `root`, and delays requests while `held()`."""
 
     def __init__(self, root, held):
         class Handler(http.server.SimpleHTTPRequestHandler):
@@ -144,7 +144,8 @@ class BreakingLine:
 
 class RudeServer:
     """Serves `root`; `rude(path, attempt)` may name a way to answer wrongly:
-    garbage, short, long, 416, 404, 500, redirect:URL, drip (a byte a second), byte (one byte, then the end)."""
+    garbage, short, long, 416, 404, 500, 511, redirect:URL, drip (a byte a second), byte (one byte, then the end), bare (no header), page
+    (a web page)."""
 
     def __init__(self, root, rude, certificate=None):
         root = pathlib.Path(root)
@@ -164,13 +165,18 @@ class RudeServer:
                     self.end_headers()
                     return
                 file = root / self.path.lstrip("/")
-                if way in ("404", "416", "500") or not file.is_file():
-                    self.send_response(int(way) if way else 404)
+                if way in ("404", "416", "500", "511") or not file.is_file():
+                    self.send_response(int(way) if way and way.isdigit() else 404)
                     self.send_header("Content-Length", "5")
                     self.end_headers()
                     self.wfile.write(b"sorry")
                     return
                 data = file.read_bytes()
+                if way == "bare":
+                    self.wfile.write(data)
+                    return
+                if way == "page":
+                    data = b"\n<!DOCTYPE html><title>Free WLAN</title>" + bytes(100)
                 length = len(data)
                 if way == "garbage":
                     data = bytes(b ^ 0x55 for b in data)

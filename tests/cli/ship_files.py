@@ -54,11 +54,11 @@ class Shop:
     @functools.cached_property
     def pattern(self):
         picture(self.folder / "picture.png")
-        return self.bake("pattern", "--pattern", self.folder / "picture.png", *QUICK)
+        return self.bake("pattern", "--pattern", self.folder / "picture.png", *QUICK, "--parameters", "all")
 
     @functools.cached_property
     def staged(self):
-        """Of two colours and so of two chunks, which have stand-ins: the first sight is coarser. Patterns take long to unpack."""
+        """Of two colours and so of two chunks, which have proxies: the preview is coarser. Patterns take long to unpack."""
         return self.bake("staged", "--model", self.two_coloured)
 
     @functools.cached_property
@@ -125,7 +125,7 @@ class ShipTest(ProgramTest):
         return json.loads(done.stdout)
 
     def assert_installed(self, *bundles, store=None):
-        """Each bundle lies in the store as it was published."""
+        """Each bundle is in the store as published."""
         for bundle in bundles:
             self.assertEqual((pathlib.Path(store or self.store) / bundle.name).read_bytes(), bundle.read_bytes())
 

@@ -13,9 +13,9 @@ from ship_files import ShipTest, contents
 SIDE = 96  # pixels of a drawn picture
 
 
-class FirstSight(ShipTest):
+class Preview(ShipTest):
     def begin(self):
-        """A fetch that is killed when it has told of the first sight: what its status says then."""
+        """A fetch that is killed when it has reported the preview: what its status says then."""
         status = self.folder / "status.json"
         status.unlink(missing_ok=True)
         server = Keeper(self.site, lambda: status.exists() and json.loads(status.read_text())["result"] == "first")
@@ -41,7 +41,8 @@ class FirstSight(ShipTest):
 
     def test_a_fetch_that_is_cut_off_leaves_something_to_show(self):
         picture(self.folder / "picture.png")
-        bundle = self.shop.bake("seen", "--model", self.shop.two_coloured, "--pattern", self.folder / "picture.png", *QUICK)
+        bundle = self.shop.bake("seen", "--model", self.shop.two_coloured, "--pattern", self.folder / "picture.png", "--parameters",
+                                "orb-2000", *QUICK)
         self.publish(bundle)
         status = self.begin()
         first = self.store / "pieces" / "museum.first"
@@ -53,7 +54,7 @@ class FirstSight(ShipTest):
         self.assertLess(first.stat().st_size, bundle.stat().st_size / 2)
         checked = self.modar("check", first)
         self.assertEqual(checked.returncode, 0, checked.stderr)
-        self.assertIn("BUNDLE_FIRST_SIGHT", checked.stdout + checked.stderr)
+        self.assertIn("BUNDLE_PREVIEW", checked.stdout + checked.stderr)
         coarse, whole = self.drawn(first), self.drawn(bundle)
         self.assertNotEqual(coarse, whole)
         far = sum(abs(a - b) > 48 for a, b in zip(coarse, whole)) / len(whole)
@@ -65,7 +66,7 @@ class FirstSight(ShipTest):
         self.assert_installed(bundle)
         self.assertEqual(os.listdir(self.store / "pieces"), [])
 
-    def test_a_bundle_that_is_installed_has_no_first_sight(self):
+    def test_a_bundle_that_is_installed_has_no_preview(self):
         self.publish(self.shop.old)
         self.fetch_json()
         self.publish(self.shop.staged)
@@ -74,7 +75,7 @@ class FirstSight(ShipTest):
         self.assertNotIn("can be shown", done.stderr)
         self.assert_installed(self.shop.staged)
 
-    def test_a_first_sight_goes_with_its_bundle(self):
+    def test_a_preview_goes_with_its_bundle(self):
         self.publish(self.shop.staged)
         self.begin()
         first, other = self.store / "pieces" / "museum.first", self.folder / "other.modar"

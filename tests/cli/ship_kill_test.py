@@ -26,7 +26,7 @@ class Kill(ShipTest):
         super().setUp()
         self.publish(self.shop.old)
         self.fetch_json()
-        self.extra = self.folder / "extra.modar"  # has a first sight
+        self.extra = self.folder / "extra.modar"  # has a preview
         shutil.copy(self.shop.staged, self.extra)
         self.publish(self.shop.new, self.extra)
         self.before = self.folder / "before"
@@ -58,7 +58,7 @@ class Kill(ShipTest):
         return points
 
     def assert_whole(self, point):
-        """What is in use opens, verifies, and is the old or the new release."""
+        """The release in use opens, verifies, and is the old or the new release."""
         done = subprocess.run([BIN / "modar-fetch", "--store", self.store, "--verify", "--json"], capture_output=True,
                               text=True)
         self.assertEqual(done.returncode, 0, f"{point}: {done.stderr}")
@@ -80,7 +80,7 @@ class Kill(ShipTest):
         points = self.points()
         self.assertGreater(len(points), 200)
         if not soak():
-            # Each kind of call, and every twelfth point; `scripts/test.sh --all` takes all.
+            # Each kind of call, and every twelfth point with --quick; else all.
             kinds = {call: i for i, (call, _) in reversed(list(enumerate(points)))}
             points = [p for i, p in enumerate(points) if i % 12 == 0 or i in kinds.values() or i >= len(points) - 8]
         installed, seen = 0, {}
@@ -99,6 +99,49 @@ class Kill(ShipTest):
         self.assertLess(installed, len(points), "every kill came after the switch")
         self.assertGreater(len(seen), 20)
         print(f"{len(points)} points, {len(seen)} stores, {installed} after the switch")
+
+
+@unittest.skipUnless(strace_works(), "strace cannot trace here")
+class Durable(ShipTest):
+    """What a power cut right after the decisive rename would take: names whose folder was not synced since."""
+
+    def unsynced(self, decisive, passed_over, *command):
+        log = self.folder / "strace.log"
+        done = subprocess.run(["strace", "-f", "-qq", "-y", "-o", log, "-e", "trace=mkdir,mkdirat,rename,renameat,openat,fsync", *command],
+                              capture_output=True, text=True, cwd=self.folder, env={**os.environ, "ASAN_OPTIONS": "detect_leaks=0"})
+        self.assertEqual(done.returncode, 0, done.stderr)
+        pending = {}
+        for line in log.read_text().splitlines():
+            call = re.search(r"\b(\w+)\((.*)\)\s+= \d", line)
+            if not call:
+                continue
+            name, words = call.groups()
+            synced = re.match(r"\d+<(.*)>", words)
+            if name == "fsync":
+                pending.pop(synced.group(1), None)
+                continue
+            if name == "openat" and "O_CREAT" not in words:
+                continue
+            base, made = re.findall(r'(?:(?:\d+|AT_FDCWD)<([^>]*)>, )?"([^"]*)"', words)[-1]
+            path = pathlib.Path(os.path.normpath(os.path.join(base or self.folder, made)))
+            if path == decisive:
+                return pending
+            if self.folder in path.parents and not passed_over(path) and path.suffix != ".tmp":
+                pending[str(path.parent)] = line
+        self.fail("the decisive rename did not come")
+
+    def test_a_release_is_named_when_all_of_it_would_survive_a_power_cut(self):
+        pending = self.unsynced(self.site / "latest", lambda path: path.name == ".lock", BIN / "modar", "ship", "publish", self.shop.old,
+                                "--to", "site", "--key", self.shop.key)
+        self.assertEqual(pending, {})
+        self.assertGreater(len(list((self.site / "objects").iterdir())), 2)
+
+    def test_a_release_is_in_use_when_all_of_it_would_survive_a_power_cut(self):
+        self.publish(self.shop.old)
+        # Pieces are checked before they are used again.
+        pending = self.unsynced(self.store / "current", lambda path: "pieces" in path.parts, BIN / "modar-fetch", self.site, "--store",
+                                self.store, "--trust", self.trust, "--quiet")
+        self.assertEqual(pending, {})
 
 
 if __name__ == "__main__":

@@ -55,7 +55,7 @@ class RealServer(ShipTest):
         self.assertGreater(line.breaks, 2)
         self.assertGreater(report["retries"], 0)
         self.assertGreater(len(self.requests(206)), 0)
-        # What came before a break is not fetched again, but for what was on its way in the pipe.
+        # Bytes received before a break are not fetched again, except those in the pipe.
         whole = sum(p.stat().st_size for p in (self.site / "objects").rglob("*") if p.is_file())
         self.assertLess(report["downloaded_bytes"], 2 * whole)
 
@@ -83,7 +83,7 @@ class RealServer(ShipTest):
         self.assert_installed(self.shop.old)
 
     def test_the_cap_holds(self):
-        """Not only of what many connections bring, but of one piece on a fast line, too."""
+        """Not only of many connections, but of one piece on a fast line, too."""
         large = self.shop.bake("large", "--model", sheet(self.folder / "large.obj", 120, 0.4), "--no-lods")
         self.publish(large)
         begin = time.monotonic()
@@ -136,6 +136,19 @@ class RudeServers(ShipTest):
                 self.expect_recovery(lambda path, attempt: way if path == "/latest" and attempt == 1 else None)
         done = self.fetch_from(lambda path, attempt: "garbage" if path.endswith(".json") else None)
         self.assertEqual(done.returncode, 10, done.stderr)
+
+    def test_a_network_that_wants_a_login_is_named(self):
+        for way in ("page", "511"):
+            for part in ("latest", "json", "minisig", "objects"):
+                with self.subTest(way=way, part=part):
+                    self.store = self.folder / f"store-{way}-{part}"
+                    done = self.fetch_from(lambda path, _: way if part in path else None, "--attempts", "2")
+                    self.assert_fails(done, 16, "log in to this network")
+
+    def test_an_answer_without_a_header_is_tried_again(self):
+        self.expect_recovery(lambda path, attempt: "bare" if attempt == 1 else None)
+        self.store = self.folder / "other"
+        self.assert_fails(self.fetch_from(lambda path, _: "bare", "--attempts", "2"), 16, "fetch.network", "no HTTP header")
 
     def test_a_byte_an_answer_gives_up(self):
         done = self.fetch_from(lambda path, _: "byte" if "objects" in path else None, "--attempts", "3")

@@ -105,7 +105,7 @@ class SeveralRootKeys(ShipTest):
         self.assertEqual(self.fetch().returncode, 10)
 
     def test_root_keys_sign_no_releases(self):
-        # One of three is no publisher, even where no root's word is there to say who is.
+        # One of three is no publisher, even where no root metadata says who is.
         self.publish(self.shop.old, key=self.homes["ada"] / "root.key")
         refused = self.fetch()
         self.assertEqual(refused.returncode, 10, refused.stderr)

@@ -1,5 +1,6 @@
-"""`modar ship` and `modar-fetch` over folders: releases, keys, what is refused, what is reused."""
+"""`modar ship` and `modar-fetch` over folders: releases, keys, refusals, reuse."""
 import base64
+import contextlib
 import hashlib
 import json
 import os
@@ -11,7 +12,7 @@ import subprocess
 import time
 import unittest
 
-from programs import BIN, ROOT
+from programs import BIN, QUICK, ROOT, mount_fat
 from ship_files import ShipTest, sheet, soak
 
 
@@ -203,7 +204,7 @@ class Publish(ShipTest):
         data = bytearray(self.shop.old.read_bytes())
         data[-1] ^= 1
         broken.write_bytes(data)
-        # Nor what is named beside it: all are looked at before the first is packed.
+        # Nor files named next to it: all are looked at before the first is packed.
         done = self.modar("ship", "publish", self.shop.old, broken, "--to", self.site, "--key", self.shop.key)
         self.assert_fails(done, 3, "ship.bad-bundle", "modar check")
         self.assertFalse(self.site.exists())
@@ -282,6 +283,16 @@ class Publish(ShipTest):
         self.fetch_json()
         self.assert_installed(self.shop.pattern)
 
+    def test_keypoints_travel_on_request_alone(self):
+        usual = self.shop.bake("usual", "--pattern", self.shop.pattern.parent.parent / "picture.png", *QUICK)
+        self.assertEqual(set(self.modar_json("inspect", usual)["patterns"][0]["keypoints"]), {"orb-2000"})
+        self.publish(usual)
+        self.fetch_json()
+        installed = self.store / "museum.modar"
+        self.assertEqual(self.modar_json("check", installed)["issues"], [])
+        self.assertEqual(self.modar_json("inspect", installed)["patterns"][0]["keypoints"], {})
+        self.assertLess(installed.stat().st_size, usual.stat().st_size)
+
 
 class Keys(ShipTest):
     def test_keygen_writes_minisign_files(self):
@@ -290,6 +301,12 @@ class Keys(ShipTest):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(stat.S_IMODE(key.stat().st_mode), 0o600)
         self.assert_fails(self.modar("ship", "keygen", "--out", key), 1, "key.exists")
+
+    def test_a_key_on_a_disk_without_permissions(self):
+        key = mount_fat(self) / "k"
+        done = self.modar("ship", "keygen", "--out", key)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.publish(self.shop.old, key=key)
 
     def test_a_key_that_others_may_read_is_told_of(self):
         key = self.folder / "k"
@@ -357,7 +374,7 @@ class Keys(ShipTest):
     def test_keygen_keeps_the_file_of_the_pass_phrase(self):
         phrase = self.folder / "phrase.pub"
         phrase.write_text("open sesame\n")
-        for out in (phrase, self.folder / "phrase"):  # the secret key, and the public one beside it
+        for out in (phrase, self.folder / "phrase"):  # the secret key, and the public one next to it
             done = self.modar("ship", "keygen", "--force", "--out", out, "--pass-phrase-file", phrase)
             self.assert_fails(done, 1, "out.input")
             self.assertEqual(phrase.read_text(), "open sesame\n")
@@ -406,7 +423,7 @@ class Keys(ShipTest):
             fetched = self.fetch_json(trust=trust)
             self.assertEqual((fetched["epoch"], fetched["version"]), (2, 2))
         self.assert_installed(self.shop.old)
-        # What the thief still serves is refused, replayed root word included.
+        # What the thief still serves is refused, replayed root metadata included.
         self.assertIn(self.fetch(stolen, trust=trust).returncode, (10, 11))
         self.assert_installed(self.shop.old)
 
@@ -452,7 +469,7 @@ class Keys(ShipTest):
         self.modar("ship", "root", "--to", self.site, "--key", root, "--next", f"{next_key}.pub")
         self.publish(self.shop.old, key=next_key)
         self.fetch_json(trust=trust)
-        for _ in range(2):  # what is refused leaves nothing behind
+        for _ in range(2):  # refused files leave nothing behind
             self.lose_state()
             for _ in range(2):
                 self.assert_fails(self.fetch(thief, trust=trust), 11, "fetch.epoch")
@@ -477,7 +494,7 @@ class Keys(ShipTest):
         self.assertNotEqual(fresh.read_text(), before)
         self.assertFalse(self.fetch_json()["changed"])
         self.assertEqual((self.store / "current" / "fresh.json").read_text(), fresh.read_text())
-        # A later release has it as well, unless it is told not to; the freshness of one is none of another.
+        # A later release has it as well, unless told otherwise; the freshness of one is not that of another.
         self.publish(self.shop.new)
         self.assertTrue((self.site / "releases" / "2.fresh.json").is_file())
         for end in ("", ".minisig"):
@@ -501,7 +518,7 @@ class Keys(ShipTest):
         self.assertEqual(sorted(p.name for p in (self.site / "releases").iterdir()), ["3.json", "3.json.minisig"])
 
     def fetch_at(self, site, days):
-        """As on a device whose clock is so many days ahead, into a store of its own."""
+        """As on a device whose clock is some days ahead, into a store of its own."""
         return self.fetch(site, store=self.folder / f"at{days}", env=self.clock(time.time() + 86400 * days))
 
     def assert_stale(self, site, days):
@@ -657,6 +674,21 @@ class Refusals(ShipTest):
         self.addCleanup(subprocess.run, ["umount", small])
         self.publish(self.shop.old)
         self.assert_fails(self.fetch(store=small / "store"), 14, "fetch.space")
+        with contextlib.suppress(OSError), open(small / "filler", "wb", buffering=0) as filler:
+            while filler.write(bytes(4096)):
+                pass
+        for store in ("store", "another"):
+            self.assert_fails(self.fetch(store=small / store), 14, str(small / store))
+
+    def test_what_a_killed_publisher_left_is_removed(self):
+        self.publish(self.shop.old)
+        left = [self.site / name for name in ("latest.123.tmp", "releases/2.json.7.tmp", next((self.site / "objects").iterdir()) / "ab.99.tmp")]
+        kept = [self.site / name for name in ("notes.tmp", "a.1x.tmp")]
+        for path in left + kept:
+            path.write_text("half")
+        done = self.modar("ship", "publish", self.shop.new, "--to", self.site, "--key", self.shop.key)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual([path for path in left + kept if path.exists()], kept)
 
     def test_no_bundle_for_this_device(self):
         self.publish(self.shop.old, options=["--for", "museum=ace2"])
@@ -875,7 +907,7 @@ class Store(ShipTest):
                     for piece in (self.site / "objects").rglob("*"):
                         if piece.is_file():
                             self.plants()[way](self.store / "pieces" / f"{piece.name}{suffix}")
-                    self.assertIn(self.fetch().returncode, (0, 2))  # what is no recipe is thrown away first
+                    self.assertIn(self.fetch().returncode, (0, 2))  # files other than recipes are removed first
                     self.fetch_json()
                     self.assert_installed(self.shop.new)
                     self.assert_nothing_outside()
@@ -893,7 +925,7 @@ class Store(ShipTest):
                     place.unlink(missing_ok=True)
                     self.plants()[way](place)
                     done = self.fetch()
-                    if name == "slots/b/museum.modar":  # without a recipe beside it, it is not ours
+                    if name == "slots/b/museum.modar":  # without a recipe next to it, it is not ours
                         self.assert_fails(done, 2, "store.foreign", str(place))
                         place.unlink()
                         done = self.fetch()
@@ -961,18 +993,7 @@ class Store(ShipTest):
         self.check_store_without_links(self.without_links())
 
     def test_a_store_on_fat(self):
-        image, mount = self.folder / "fat.img", self.folder / "fat"
-        mount.mkdir()
-        made = shutil.which("mkfs.vfat", path="/sbin:/usr/sbin:/bin:/usr/bin")
-        if not made:
-            self.skipTest("mkfs.vfat is not installed")
-        with open(image, "wb") as file:
-            file.truncate(64 << 20)
-        subprocess.run([made, image], check=True, capture_output=True)
-        ways = [["mount", "-o", "loop", image, mount], ["fusefat", "-o", "rw+", image, mount]]
-        if not any(shutil.which(way[0]) and subprocess.run(way, capture_output=True).returncode == 0 for way in ways):
-            self.skipTest("no right to mount a FAT image, and fusefat is not installed or fails")
-        self.addCleanup(subprocess.run, ["umount", mount])
+        mount = mount_fat(self)
         self.store = mount / "store"
         self.check_store_without_links(None)
 

@@ -1,5 +1,5 @@
-// Table 9's figures of a run that was worked out by hand.
-#include "bake/lab/bench_parts.hpp"
+// Table 9's figures of a run that was worked out on paper.
+#include "bake/extensions/lab/bench_parts.hpp"
 
 #include <algorithm>
 #include <cmath>

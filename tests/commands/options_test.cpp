@@ -55,7 +55,7 @@ BakeRequest by_project(const BakeOption& option) {
   const bool plain = is_truth(option) || std::holds_alternative<NumberOption>(option.value);
   const std::string quote = plain ? "" : "\"";
   const std::string table = option.part == OptionPart::kProject ? "[project]\n" : "[bake]\n";
-  const std::string line = std::string(option.key) + " = " + quote + option.example + quote + "\n";
+  const std::string line = std::string(option.name) + " = " + quote + option.example + quote + "\n";
   const std::string text = table + line + "[[model]]\nfile = \"a.obj\"\n";
   EXPECT_TRUE(write_file(folder.file("modar.toml"), std::string_view(text)));
   const auto project = read_project(folder.file("modar.toml"));
@@ -75,8 +75,8 @@ TEST(Options, EveryRowHasNamesOfItsOwn) {
   std::set<std::string> members;
   for (const BakeOption& option : bake_options()) {
     EXPECT_TRUE(std::string(option.flag).starts_with("--") && flags.insert(option.flag).second);
-    EXPECT_TRUE(*option.key != 0 && keys.insert(option.key).second) << option.flag;
-    EXPECT_TRUE(*option.meta != 0 && members.insert(option.meta).second) << option.flag;
+    EXPECT_TRUE(*option.name != 0 && keys.insert(option.name).second) << option.flag;
+    EXPECT_TRUE(*option.name != 0 && members.insert(option.name).second) << option.flag;
     EXPECT_GT(std::string(option.help).size(), 10U) << option.flag;
   }
   EXPECT_GE(keys.size(), 19U);
@@ -115,12 +115,12 @@ TEST(Options, WrongMetaTextsChangeNothing) {
     for (const char* wrong : {"-1", "4294967296", "1e300", "\"moon\"", "{}", "null"}) {
       BakeRequest request;
       restore_options(
-          Json::parse("{\"" + std::string(option.meta) + "\": " + std::string(wrong) + "}"),
+          Json::parse("{\"" + std::string(option.name) + "\": " + std::string(wrong) + "}"),
           request);
       const bool any_number =
-          std::string(option.meta) == "max_error" || std::string(option.meta) == "unit_metres";
+          std::string(option.name) == "max-error" || std::string(option.name) == "unit";
       if (any_number) continue;
-      EXPECT_EQ(stated(request), stated({})) << option.meta << " " << wrong;
+      EXPECT_EQ(stated(request), stated({})) << option.name << " " << wrong;
     }
   }
 }

@@ -1,4 +1,4 @@
-// Text forms of options: what is taken, and what is refused with a cure.
+// Text forms of options: accepted values, and those refused with a cure.
 #include "bake/options/request_text.hpp"
 
 #include <gtest/gtest.h>

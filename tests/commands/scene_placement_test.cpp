@@ -112,12 +112,38 @@ TEST(Placement, MillimetresNeedAWidth) {
   ASSERT_TRUE(tall);
   EXPECT_EQ(tall->size.kind, SceneSize::Kind::kScale);
   EXPECT_DOUBLE_EQ(tall->size.value, 0.25);
-  request.up = UpAxis::kX;  // now 50 mm high as it stands at scale 1
+  request.up = UpAxis::kX;  // now 50 mm high at scale 1
   EXPECT_DOUBLE_EQ(resolve_scene(request, wide_picture(), 0, {0, {1, 2, 4}})->size.value, 1.0);
   request.size.kind = SceneSize::Kind::kWidth;  // x of the pattern is the model's -z or z
   EXPECT_DOUBLE_EQ(resolve_scene(request, wide_picture(), 0, {0, {1, 2, 4}})->size.value, 0.25);
   request.up = UpAxis::kZ;
   EXPECT_EQ(resolve_scene(request, wide_picture(), 0, {0, {0, 2, 4}}).error().code, "scene.flat");
+}
+
+TEST(Placement, AFlatModelHasNoSizeToGive) {
+  SceneRequest request = standing(UpAxis::kZ);
+  request.size = {SceneSize::Kind::kWidth, 50};
+  const auto code = [&](std::array<double, 3> sides) {
+    const auto resolved = resolve_scene(request, wide_picture(), 0, {0, sides});
+    return resolved ? "" : resolved.error().code;
+  };
+  EXPECT_EQ(code({3.99e-4, 2, 4}), "scene.flat");  // less than 1 / 10,000 of the largest side
+  EXPECT_EQ(code({4.01e-4, 2, 4}), "");
+  EXPECT_EQ(code({0, 0, 0}), "scene.flat");
+  request.size.kind = SceneSize::Kind::kHeight;
+  EXPECT_EQ(code({2, 4, 3.99e-4}), "scene.flat");
+  EXPECT_EQ(code({2, 4, 4.01e-4}), "");
+  request.up = UpAxis::kY;
+  EXPECT_EQ(code({2, 1e-40, 4}), "scene.flat");
+  // A unit is 100 mm, and the model is 2 units high at scale 1.
+  request.size.value = 2.00001e8;
+  EXPECT_EQ(code({1, 1, 1}), "scene.size");
+  request.size.value = 1.99999e8;
+  EXPECT_EQ(code({1, 1, 1}), "");
+  request.size.value = 1.99999e-4;
+  EXPECT_EQ(code({1, 1, 1}), "scene.size");
+  request.size.value = 2.00001e-4;
+  EXPECT_EQ(code({1, 1, 1}), "");
 }
 
 TEST(Placement, OffsetsAreMillimetresWhereTheWidthIsKnown) {

@@ -19,7 +19,7 @@ Bytes damaged(const BundleContent& content, Damage damage) {
   return bytes;
 }
 
-/// The same with the hashes left as they were.
+/// The same with the hashes left unchanged.
 template <class Damage>
 Bytes broken(const BundleContent& content, Damage damage) {
   Bytes bytes = encode(content);
@@ -131,12 +131,12 @@ constexpr CorruptCase kSectionCases[] = {
          record_of<ChunkRecord>(b, SectionType::kChunks, 1).bounds_min[1] = 2;
        });
      }},
-    {"BUNDLE_STAND_IN",
+    {"BUNDLE_PROXY",
      [] {
        BundleContent content = scene_content();
-       add_stand_ins(content);
+       add_proxies(content);
        return damaged(content, [](Bytes& b) {
-         record_of<StandInRecord>(b, SectionType::kStandIns, 1).model = 3;
+         record_of<ProxyRecord>(b, SectionType::kProxies, 1).model = 3;
        });
      }},
     {"BUNDLE_LEVEL_RANGE",

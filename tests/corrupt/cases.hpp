@@ -16,7 +16,7 @@ struct CorruptCase {
 std::span<const CorruptCase> structure_cases();
 /// Damage to payloads, in bundles that open.
 std::span<const CorruptCase> payload_cases();
-/// What only a workstation finds, in bundles that are good by their bytes: they lie in
+/// What only a workstation finds, in bundles that are good by their bytes: they are in
 /// tests/corrupt/workstation/, each with the words of its `modar check` (ID.args) and the files
 /// that these name (ID/).
 std::span<const CorruptCase> workstation_cases();

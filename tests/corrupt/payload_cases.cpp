@@ -206,6 +206,7 @@ constexpr CorruptCase kPayloadCases[] = {
        });
      }},
     {"BUNDLE_EMPTY", [] { return encode(BundleContent()); }},
+    {"NEVER_SHOWN", [] { return changed(golden_content(), [](auto& c) { c.scenes.pop_back(); }); }},
     {"NODE_TEXT",
      [] {
        return changed(acting_content(), [](auto& c) {

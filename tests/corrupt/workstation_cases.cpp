@@ -1,4 +1,4 @@
-// Bundles that are good by their bytes, and bad for a device or beside a source.
+// Bundles that are good by their bytes, and bad for a device or next to a source.
 #include <algorithm>
 #include <cstring>
 
@@ -71,7 +71,7 @@ ExtraSection empty_record(std::uint32_t width, std::uint32_t height) {
   return section;
 }
 
-/// The octahedron on the pattern, a tenth larger than the bundle says that it was asked for.
+/// The octahedron on the pattern, a tenth larger than the bundle says that it was requested.
 Bytes scaled_scene() {
   BundleContent content = model_content();
   const BundleContent pattern = pattern_content();
@@ -85,6 +85,26 @@ Bytes scaled_scene() {
   scene.rotation[3] = 1;
   content.scenes.push_back(scene);
   return encode(content);
+}
+
+/// A content as if `modar bake` had made it, with these assets in its meta text.
+Bytes baked(BundleContent content, const std::string& assets) {
+  content.meta = "{\"tool\":\"modar 0\"," + assets + "}";
+  return encode(content);
+}
+
+/// The octahedron, changed. Its chunks are in an order of their own.
+Bytes baked_model(void (*change)(BundleContent&)) {
+  BundleContent content = model_content();
+  change(content);
+  return baked(content, R"("models":[{"file":"octahedron.obj"}])");
+}
+
+/// The pattern with a record of a picture that gives none.
+BundleContent recorded_pattern() {
+  BundleContent content = pattern_content();
+  content.extra.push_back(empty_record(content.patterns[0].width, content.patterns[0].height));
+  return content;
 }
 
 constexpr CorruptCase kWorkstationCases[] = {
@@ -113,6 +133,44 @@ constexpr CorruptCase kWorkstationCases[] = {
     {"SOURCE_SCENE", scaled_scene},
     {"POSE_RANGE", [] { return encode(pattern_content()); }},
     {"VISUAL_DIFFERS", [] { return encode(model_content()); }},
+    {"META_DIFFERS", [] { return baked(model_content(), R"("models":[{"file":"cube.obj"}])"); }},
+    {"RECORD_UNUSED",
+     [] { return baked_model([](BundleContent& content) { content.names += "left over"; }); }},
+    {"NUMBER_TINY",
+     [] {
+       return baked_model([](BundleContent& content) { content.materials[0].shininess = 1e-40f; });
+     }},
+    {"MODEL_FIGURES",
+     [] { return baked_model([](BundleContent& content) { --content.models[0].vertex_count; }); }},
+    {"CHUNK_CONTENT", [] { return baked_model([](BundleContent&) {}); }},
+    {"TEXTURE_CONTENT",
+     [] {
+       BundleContent content = texture_content();
+       content.textures[0].psnr_db += 1;
+       return baked(content, R"("models":[])");
+     }},
+    {"PATTERN_CONTENT", [] { return baked(recorded_pattern(), R"("patterns":[{"file":"box"}])"); }},
+    {"SCENE_CONTENT",
+     [] {
+       BundleContent content = recorded_pattern();
+       const BundleContent model = model_content();
+       content.models = model.models;
+       content.chunks = model.chunks;
+       content.levels = model.levels;
+       content.materials = model.materials;
+       content.layouts = model.layouts;
+       content.vertices = model.vertices;
+       content.indices = model.indices;
+       content.models[0].name = content.materials[0].name = content.intern("octahedron");
+       SceneRecord scene{};
+       scene.scale = 1;
+       scene.rotation[3] = 1;
+       content.scenes.push_back(scene);
+       content.shadows = {std::vector<std::byte>(sizeof(ShadowHeader) + 1)};
+       const ShadowHeader header{1, 1, {-1, -1}, {1, 1}, {}};
+       std::memcpy(content.shadows[0].data(), &header, sizeof header);
+       return baked(content, R"("models":[{"file":"octahedron"}],"patterns":[{"file":"box"}])");
+     }},
 };
 
 }  // namespace

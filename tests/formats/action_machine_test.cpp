@@ -170,7 +170,7 @@ TEST_F(ActionTest, TurnsAddUp) {
   machine_->step(9.0, std::vector{kSeen});
   EXPECT_NEAR(angle(), 120, 1e-3);
   EXPECT_FALSE(machine_->waiting());
-  // A half turn about x after 120 degrees about z: x y z w of the product, by hand.
+  // A half turn about x after 120 degrees about z: x y z w of the product, computed on paper.
   machine_->step(9.1, std::vector{kSeen, tap(kRim)});
   const NodeTurn both = machine_->turn_of(kPot);
   EXPECT_NEAR(both.x, 0.5, 1e-6);
@@ -179,7 +179,7 @@ TEST_F(ActionTest, TurnsAddUp) {
   EXPECT_NEAR(both.w, 0, 1e-6);
 }
 
-/// What the videos are told: "+3" plays, "-3" pauses.
+/// The videos' commands: "+3" plays, "-3" pauses.
 std::string told(std::span<const SceneCommand> commands) {
   std::string text;
   for (const SceneCommand& command : commands) {
@@ -202,7 +202,7 @@ TEST_F(ActionTest, VideosPlayWhileTheyAreWantedAndSeen) {
   EXPECT_EQ(step(1.1, {kSeen}), "");
   EXPECT_EQ(step(2.1, {}), "");  // a second of grace
   EXPECT_EQ(step(2.2, {}), "-3");
-  EXPECT_EQ(step(5, {kSeen}), "+3");  // it goes on
+  EXPECT_EQ(step(5, {kSeen}), "+3");  // it continues
   EXPECT_EQ(step(5.1, {kSeen, tap(kRim)}), "-3");
   EXPECT_EQ(step(7, {}), "");
   EXPECT_EQ(step(8, {kSeen}), "");  // paused by the visitor

@@ -3,16 +3,26 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
+#include <cerrno>
 #include <csignal>
+#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+
+#include "formats/base/folder_lock.hpp"
 
 namespace {
 
@@ -117,7 +127,7 @@ TEST_F(AtomicFileTest, NeverWritesIntoWhatLiesInItsTemporarysPlace) {
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(victim), {}), "mine");
 }
 
-/// A limit on the size of files stands in for a full disk.
+/// A limit on the size of files imitates a full disk.
 TEST_F(AtomicFileTest, KeepsTheOldFileWhenTheDiskIsFull) {
   ASSERT_TRUE(modar::write_file(path(), "old"));
   rlimit before{};
@@ -130,8 +140,44 @@ TEST_F(AtomicFileTest, KeepsTheOldFileWhenTheDiskIsFull) {
   std::signal(SIGXFSZ, handler);
   ASSERT_FALSE(written);
   EXPECT_EQ(written.error().code, "io.write");
+  EXPECT_NE(written.error().cure.find("files of this size"), std::string::npos);
   EXPECT_EQ(content(), "old");
   EXPECT_EQ(files(), 1);
+}
+
+TEST_F(AtomicFileTest, NamesTheDiskThatDoesNotTakeTheName) {
+  const auto written = modar::write_file((folder_ / std::string(300, 'x')).string(), "new");
+  ASSERT_FALSE(written);
+  EXPECT_NE(written.error().cure.find("rename the file"), std::string::npos);
+}
+
+/// From now on flock() fails in this process, as on a network share without locks.
+bool take_locks_away() {
+  std::array<sock_filter, 4> program = {
+      sock_filter BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
+      sock_filter BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_flock, 0, 1),
+      sock_filter BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | ENOLCK),
+      sock_filter BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW)};
+  const sock_fprog whole = {program.size(), program.data()};
+  return ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
+         ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &whole) == 0;
+}
+
+TEST_F(AtomicFileTest, LocksAFolderOnceWhereTheFileSystemHasLocks) {
+  const modar::Error busy{modar::ExitCode::kIo, "busy", "", "", ""};
+  {
+    const auto first = modar::FolderLock::take(path(), busy);
+    ASSERT_TRUE(first);
+    const auto second = modar::FolderLock::take(path(), busy);
+    ASSERT_FALSE(second);
+    EXPECT_EQ(second.error().code, "busy");
+  }
+  const pid_t child = ::fork();
+  if (child == 0) ::_exit(!take_locks_away() ? 2 : modar::FolderLock::take(path(), busy) ? 0 : 1);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  if (WEXITSTATUS(status) == 2) GTEST_SKIP() << "seccomp is not allowed here";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 }  // namespace

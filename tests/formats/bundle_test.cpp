@@ -83,10 +83,10 @@ TEST(Bundle, RoundTripGivesTheSameContent) {
   expect_bytes(view->section(static_cast<SectionType>(100), 7, 9), content.extra[0].bytes, "extra");
 }
 
-TEST(Bundle, StandInsCountOnFromTheModels) {
+TEST(Bundle, ProxiesCountOnFromTheModels) {
   BundleContent content = lit_content();
   EXPECT_EQ(minor_version_of(content), 2);
-  add_stand_ins(content);
+  add_proxies(content);
   const Bytes bytes = encode(content);
   const auto view = BundleView::open(bytes);
   ASSERT_TRUE(view) << to_line(view.error());
@@ -110,9 +110,9 @@ TEST(Bundle, StandInsCountOnFromTheModels) {
 }
 
 /// A reader that knows none of the three sections: to ours, they are of unknown types.
-TEST(Bundle, AReaderWithoutStandInsDrawsTheModels) {
+TEST(Bundle, AReaderWithoutProxiesDrawsTheModels) {
   BundleContent content = lit_content();
-  add_stand_ins(content);
+  add_proxies(content);
   Bytes bytes = encode(content);
   for (const std::uint32_t type : {72u, 71u, 67u}) {
     entry_of(bytes, static_cast<SectionType>(type)).type = type + 100;
@@ -180,7 +180,7 @@ TEST(DrawOrder, OnlyATreeOfAllTrianglesPasses) {
 }
 
 TEST(DrawOrder, AWalkEndsOnAnyNodes) {
-  // Each node says that all others lie behind it.
+  // Each node says that all others are behind it.
   std::vector<DrawOrderRecord> nodes(9);
   for (std::uint32_t i = 0; i < nodes.size(); ++i) nodes[i] = {{0, 0, 1, 0}, 99, i};
   std::vector<DrawOrderRange> waiting;
@@ -360,7 +360,7 @@ TEST(Bundle, TrimmedHoldsAllThatPlayersRead) {
 /// Its first texture at 512 x 512, all other things of the format too.
 BundleContent staged_content() {
   BundleContent content = acting_content();
-  add_stand_ins(content);
+  add_proxies(content);
   TextureRecord& texture = content.textures[0];
   texture.width = texture.height = 512;
   content.texture_levels.clear();
@@ -377,12 +377,12 @@ BundleContent staged_content() {
   return content;
 }
 
-TEST(Bundle, TheFirstSightNeedsTwoStagesAndIsAGoodBundle) {
+TEST(Bundle, ThePreviewNeedsTwoStagesAndIsAGoodBundle) {
   const BundleContent content = staged_content();
   Bytes bytes = encode(content);
   const auto whole = BundleView::open(bytes);
   ASSERT_TRUE(whole) << to_line(whole.error());
-  const Bytes wanted = encode(first_sight(*whole));
+  const Bytes wanted = encode(preview(*whole));
   std::size_t late = 0;
   for (const StageRange& range : stage_ranges(*whole)) {
     if (range.stage != LoadStage::kRefine) continue;
@@ -391,7 +391,7 @@ TEST(Bundle, TheFirstSightNeedsTwoStagesAndIsAGoodBundle) {
     late += range.size;
   }
   EXPECT_GT(late, 2 * 512u * 512 / 2) << "the finest level and its alpha twin";
-  const Bytes got = encode(first_sight(*BundleView::open(bytes)));
+  const Bytes got = encode(preview(*BundleView::open(bytes)));
   EXPECT_EQ(got, wanted);
   EXPECT_EQ(report(got), std::vector<std::string>{"good"});
 }
@@ -406,7 +406,7 @@ TEST(Bundle, OpensWithoutTwinsThatTheTableHides) {
   Bytes bytes = encode(content);
   const auto whole = BundleView::open(bytes);
   ASSERT_TRUE(whole) << to_line(whole.error());
-  const Bytes wanted = encode(first_sight(*whole));
+  const Bytes wanted = encode(preview(*whole));
   std::size_t hidden = 0;
   for (const SectionEntry& entry : whole->sections()) {
     const auto type = static_cast<SectionType>(entry.type);
@@ -424,20 +424,20 @@ TEST(Bundle, OpensWithoutTwinsThatTheTableHides) {
   const auto rest = BundleView::open(bytes);
   ASSERT_TRUE(rest) << to_line(rest.error());
   EXPECT_EQ(rest->sections().size(), sections - hidden);
-  EXPECT_EQ(encode(first_sight(*rest)), wanted);
+  EXPECT_EQ(encode(preview(*rest)), wanted);
   EXPECT_FALSE(hide_twins(std::span(bytes).first(63)));
   EXPECT_FALSE(hide_twins(std::span(bytes).first(64 + 48 * (sections - hidden) - 1)));
 }
 
-TEST(Bundle, TheFirstSightHoldsStandInsAndSmallTextures) {
+TEST(Bundle, ThePreviewHoldsProxiesAndSmallTextures) {
   const BundleContent content = staged_content();
   const Bytes bytes = encode(content);
-  const Bytes small = encode(first_sight(*BundleView::open(bytes)));
+  const Bytes small = encode(preview(*BundleView::open(bytes)));
   const auto view = BundleView::open(small);
   ASSERT_TRUE(view) << to_line(view.error());
   EXPECT_LT(small.size(), bytes.size() / 2);
-  // Of models 0 and 2 the coarsest stand-ins, of 1 all of its own chunks.
-  EXPECT_EQ(view->stand_ins().size(), 0u);
+  // Of models 0 and 2 the coarsest proxies, of 1 all of its own chunks.
+  EXPECT_EQ(view->proxies().size(), 0u);
   EXPECT_EQ(view->models()[0].chunk_count, 1u);
   EXPECT_EQ(view->models()[0].triangle_count, 3u);
   EXPECT_EQ(view->models()[1].chunk_count, content.models[1].chunk_count);
@@ -445,11 +445,10 @@ TEST(Bundle, TheFirstSightHoldsStandInsAndSmallTextures) {
   EXPECT_EQ(view->models()[0].position_error_max,
             content.models[0].position_error_max + 0.5 * content.models[0].scale);
   const LevelRecord& level = view->levels()[view->chunks()[0].first_level];
-  const LevelRecord& stand_in = content.stand_in_levels[2];
-  expect_bytes(
-      view->indices().subspan(level.index_offset, 2ull * level.index_count),
-      std::span(content.indices).subspan(stand_in.index_offset, 2ull * stand_in.index_count),
-      "triangles of the stand-in");
+  const LevelRecord& proxy = content.proxy_levels[2];
+  expect_bytes(view->indices().subspan(level.index_offset, 2ull * level.index_count),
+               std::span(content.indices).subspan(proxy.index_offset, 2ull * proxy.index_count),
+               "triangles of the proxy");
   EXPECT_EQ(view->textures()[0].width, kShownSide);
   EXPECT_EQ(view->texture_levels()[0].width, kShownSide);
   EXPECT_EQ(view->texture_data(0)[0], std::byte{2}) << "the second level's blocks";

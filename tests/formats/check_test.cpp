@@ -48,9 +48,10 @@ TEST(Check, GoodBundlesAreGood) {
   EXPECT_EQ(report(encode(pattern_content())), std::vector<std::string>{"good"});
   EXPECT_EQ(report(encode(model_content())), std::vector<std::string>{"good"});
   const auto golden = report(encode(golden_content()));
-  ASSERT_EQ(golden.size(), 2u) << golden[0];
+  ASSERT_EQ(golden.size(), 3u) << golden[0];
   EXPECT_EQ(golden[0].substr(0, 20), "info SECTION_UNKNOWN");
-  EXPECT_EQ(golden[1], "good");
+  EXPECT_EQ(golden[1].substr(0, 35), "warning NEVER_SHOWN model 'integer'");
+  EXPECT_EQ(golden[2], "good");
 }
 
 /// Every bit under `scripts/test.sh --soak`, two or three of each byte otherwise.
@@ -112,7 +113,7 @@ TEST(Check, ConesHoldTheNormalsOfTheirTriangles) {
 }
 
 /// What a writer of other bundles may get wrong though no hash tells: a change to a good bundle
-/// with all of 1.2, and what is said of it first.
+/// with all of 1.2, and its first issue.
 template <class Damage>
 std::string said_of(Damage damage) {
   Bytes bytes = encode(lit_content());
@@ -121,44 +122,44 @@ std::string said_of(Damage damage) {
   return report(bytes).front();
 }
 
-TEST(Check, StandInsAreWholeAndInOrder) {
+TEST(Check, ProxiesAreWholeAndInOrder) {
   const auto said = [](auto damage) {
     BundleContent content = lit_content();
-    add_stand_ins(content);
+    add_proxies(content);
     Bytes bytes = encode(content);
     damage(bytes);
     rehash(bytes);
     const std::string line = report(bytes).front();
     return line.substr(0, line.find(' ', line.find(' ') + 1));
   };
-  const auto stand_in = [](Bytes& b, std::uint32_t i) -> StandInRecord& {
-    return record_of<StandInRecord>(b, SectionType::kStandIns, i);
+  const auto proxy = [](Bytes& b, std::uint32_t i) -> ProxyRecord& {
+    return record_of<ProxyRecord>(b, SectionType::kProxies, i);
   };
   const auto level = [](Bytes& b, std::uint32_t i) -> LevelRecord& {
-    return record_of<LevelRecord>(b, SectionType::kStandInLevels, i);
+    return record_of<LevelRecord>(b, SectionType::kProxyLevels, i);
   };
-  const std::string wrong = "error BUNDLE_STAND_IN";
+  const std::string wrong = "error BUNDLE_PROXY";
   EXPECT_EQ(said([](Bytes&) {}), "good");
-  EXPECT_EQ(said([&](Bytes& b) { stand_in(b, 2).model = 3; }), wrong);
-  EXPECT_EQ(said([&](Bytes& b) { stand_in(b, 0).model = 1; }), wrong);
-  EXPECT_EQ(said([&](Bytes& b) { stand_in(b, 0).first_chunk = 5; }), wrong);
-  EXPECT_EQ(said([&](Bytes& b) { stand_in(b, 2).chunk_count = 2; }), wrong);
-  EXPECT_EQ(said([&](Bytes& b) { stand_in(b, 1).first_chunk = 0xFFFFFFFFu; }), wrong);
+  EXPECT_EQ(said([&](Bytes& b) { proxy(b, 2).model = 3; }), wrong);
+  EXPECT_EQ(said([&](Bytes& b) { proxy(b, 0).model = 1; }), wrong);
+  EXPECT_EQ(said([&](Bytes& b) { proxy(b, 0).first_chunk = 5; }), wrong);
+  EXPECT_EQ(said([&](Bytes& b) { proxy(b, 2).chunk_count = 2; }), wrong);
+  EXPECT_EQ(said([&](Bytes& b) { proxy(b, 1).first_chunk = 0xFFFFFFFFu; }), wrong);
   EXPECT_EQ(said([&](Bytes& b) { level(b, 0).error = 0.25f; }), wrong);
-  EXPECT_EQ(said([&](Bytes& b) { stand_in(b, 1).reserved = 1; }), "error BUNDLE_RESERVED");
+  EXPECT_EQ(said([&](Bytes& b) { proxy(b, 1).reserved = 1; }), "error BUNDLE_RESERVED");
   EXPECT_EQ(said([&](Bytes& b) { level(b, 2).error = 0.0625f; }), "error LEVEL_ORDER");
   EXPECT_EQ(said([&](Bytes& b) { level(b, 3).vertex_count = 60000; }), "error BUNDLE_LEVEL_RANGE");
   EXPECT_EQ(said([](Bytes& b) {
-              record_of<ChunkRecord>(b, SectionType::kStandInChunks, 1).first_level = 2;
+              record_of<ChunkRecord>(b, SectionType::kProxyChunks, 1).first_level = 2;
             }),
             "error BUNDLE_CHUNK_RANGE");
   EXPECT_EQ(said([](Bytes& b) {
-              record_of<ChunkRecord>(b, SectionType::kStandInChunks, 1).level_count = 2;
-              record_of<ChunkRecord>(b, SectionType::kStandInChunks, 2).first_level = 12;
+              record_of<ChunkRecord>(b, SectionType::kProxyChunks, 1).level_count = 2;
+              record_of<ChunkRecord>(b, SectionType::kProxyChunks, 2).first_level = 12;
             }),
             wrong);
   EXPECT_EQ(said([](Bytes& b) {
-              record_of<ChunkRecord>(b, SectionType::kStandInChunks, 3).bounds_max[2] = 0.5f;
+              record_of<ChunkRecord>(b, SectionType::kProxyChunks, 3).bounds_max[2] = 0.5f;
             }),
             "error CHUNK_LOOSE");
 }
@@ -208,6 +209,33 @@ TEST(Check, CornersOfBoxesLieNearTheirPattern) {
     });
     EXPECT_EQ(said.substr(0, 20), "error BUNDLE_PATTERN") << place << ": " << said;
   }
+}
+
+TEST(Check, PatternPicturesAreWebPFilesOfAtMost32KiB) {
+  const auto good = [](std::size_t size, std::size_t stated, const char* magic) {
+    BundleContent content = pattern_content();
+    ExtraSection picture;
+    picture.type = static_cast<std::uint32_t>(SectionType::kPatternPicture);
+    picture.owner = 0;
+    picture.bytes.resize(size);
+    const auto number = static_cast<std::uint32_t>(stated - 8);
+    std::memcpy(picture.bytes.data(), "RIFF", 4);
+    std::memcpy(picture.bytes.data() + 4, &number, sizeof number);
+    std::memcpy(picture.bytes.data() + 8, magic, 4);
+    content.extra.push_back(picture);
+    const Bytes bytes = encode(content);
+    EXPECT_TRUE(BundleView::open(bytes)) << "players open a bundle before its pictures have come";
+    const std::string said = report(bytes)[0];
+    EXPECT_TRUE(said == "good" || said.starts_with("error BUNDLE_PATTERN")) << said;
+    return said == "good";
+  };
+  EXPECT_TRUE(good(13, 13, "WEBP"));
+  EXPECT_TRUE(good(32768, 32768, "WEBP"));
+  EXPECT_FALSE(good(32769, 32769, "WEBP"));
+  EXPECT_FALSE(good(12, 12, "WEBP")) << "nothing behind the header";
+  EXPECT_FALSE(good(100, 101, "WEBP")) << "cut short";
+  EXPECT_FALSE(good(100, 99, "WEBP")) << "too long";
+  EXPECT_FALSE(good(100, 100, "WAVE"));
 }
 
 /// The bounds hold for every light that can be: those of a single lamp in any direction, whose

@@ -80,7 +80,7 @@ void put_vertex(std::vector<std::byte>& out, const LayoutRecord& layout,
       break;
     case 12:
       for (const float v : p) put(out, static_cast<std::int16_t>(v * 16384.0f));
-      // The octahedral square: the lower tip lies in its corners.
+      // The octahedral square: the lower tip is in its corners.
       put(out, float_to_snorm8(p[2] < 0 ? 1.0f : p[0]));
       put(out, float_to_snorm8(p[2] < 0 ? 1.0f : p[1]));
       for (const float v : p) put(out, float_to_unorm8((v + 1) / 2));
@@ -563,6 +563,13 @@ void add_nodes(BundleContent& content) {
   voice.poster = kNone;
   content.media = {media, voice};
   content.media_data = {small_mp4(640, 360, 12), small_sound(3)};
+  ExtraSection preview;
+  preview.type = static_cast<std::uint32_t>(SectionType::kPatternPicture);
+  preview.owner = 0;
+  for (const char letter : std::string_view("RIFF\x0a\0\0\0WEBPVP8 \0\0", 18)) {
+    preview.bytes.push_back(static_cast<std::byte>(letter));
+  }
+  content.extra.push_back(preview);
   ActionRecord tap = action_of(ActionEvent::kTap, 0, ActionCommand::kNext, 1);
   tap.part = content.intern("skin");
   ActionRecord after = action_of(ActionEvent::kAfter, 0, ActionCommand::kTurn, 0);
@@ -595,11 +602,11 @@ BundleContent acting_content() {
 
 namespace {
 
-/// One chunk of `triangles` over a model's vertices, as the last stand-in's.
-void add_stand_in_chunk(BundleContent& content, const ModelRecord& model, bool upper,
-                        std::size_t triangles, float error) {
+/// One chunk of `triangles` over a model's vertices, as the last proxy's.
+void add_proxy_chunk(BundleContent& content, const ModelRecord& model, bool upper,
+                     std::size_t triangles, float error) {
   ChunkRecord chunk = content.chunks[model.first_chunk + (upper ? 0u : 1u)];
-  chunk.first_level = static_cast<std::uint32_t>(content.stand_in_levels.size());
+  chunk.first_level = static_cast<std::uint32_t>(content.proxy_levels.size());
   chunk.level_count = 1;
   LevelRecord level = content.levels[content.chunks[model.first_chunk].first_level];
   level.index_offset = content.indices.size();
@@ -608,31 +615,32 @@ void add_stand_in_chunk(BundleContent& content, const ModelRecord& model, bool u
   for (const std::uint16_t index : std::span(upper ? kUpper : kLower).first(3 * triangles)) {
     put(content.indices, index);
   }
-  content.stand_in_chunks.push_back(chunk);
-  content.stand_in_levels.push_back(level);
-  ++content.stand_ins.back().chunk_count;
+  content.proxy_chunks.push_back(chunk);
+  content.proxy_levels.push_back(level);
+  ++content.proxies.back().chunk_count;
 }
 
 }  // namespace
 
-void add_stand_ins(BundleContent& content) {
+void add_proxies(BundleContent& content) {
   const auto add = [&content](std::uint32_t model) {
-    content.stand_ins.push_back(
-        {model, static_cast<std::uint32_t>(content.stand_in_chunks.size()), 0, 0});
+    content.proxies.push_back(
+        {model, static_cast<std::uint32_t>(content.proxy_chunks.size()), 0, 0});
   };
   add(0);
-  add_stand_in_chunk(content, content.models[0], true, 4, 0.125f);
-  add_stand_in_chunk(content, content.models[0], false, 4, 0.125f);
+  add_proxy_chunk(content, content.models[0], true, 4, 0.125f);
+  add_proxy_chunk(content, content.models[0], false, 4, 0.125f);
   add(0);
-  add_stand_in_chunk(content, content.models[0], true, 3, 0.5f);
+  add_proxy_chunk(content, content.models[0], true, 3, 0.5f);
   add(2);
-  add_stand_in_chunk(content, content.models[2], false, 4, 0.25f);
+  add_proxy_chunk(content, content.models[2], false, 4, 0.25f);
 }
 
 BundleContent lit_content() {
   BundleContent content = golden_content();
   content.extra.clear();
   add_looks(content);
+  add_scene(content, 0, 1);  // nothing is never shown
   return content;
 }
 

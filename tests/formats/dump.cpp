@@ -152,10 +152,10 @@ json dump_models(const BundleView& view) {
   return rows;
 }
 
-json dump_stand_ins(const BundleView& view) {
+json dump_proxies(const BundleView& view) {
   json rows = json::array();
-  for (std::uint32_t i = 0; i < view.stand_ins().size(); ++i) {
-    const StandInRecord& record = view.stand_ins()[i];
+  for (std::uint32_t i = 0; i < view.proxies().size(); ++i) {
+    const ProxyRecord& record = view.proxies()[i];
     json out;
     GET(model), GET(first_chunk), GET(chunk_count);
     rows.push_back(out);
@@ -394,9 +394,9 @@ json dump(const BundleView& view) {
           {"models", dump_models(view)},
           {"chunks", dump_chunks(view, 0, chunks)},
           {"levels", dump_levels(view, 0, models)},
-          {"stand_ins", dump_stand_ins(view)},
-          {"stand_in_chunks", dump_chunks(view, chunks, view.chunks().size())},
-          {"stand_in_levels", dump_levels(view, models, view.chunk_groups())},
+          {"proxies", dump_proxies(view)},
+          {"proxy_chunks", dump_chunks(view, chunks, view.chunks().size())},
+          {"proxy_levels", dump_levels(view, models, view.chunk_groups())},
           {"materials", dump_materials(view)},
           {"layouts", dump_layouts(view)},
           {"textures", dump_textures(view)},

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <cstring>
 #include <string>
 
 #include "formats/bundle_view.hpp"
@@ -75,19 +76,19 @@ TEST_P(Golden, BothReadersDecodeTheSame) {
   EXPECT_EQ(ours, theirs) << nlohmann::json::diff(ours, theirs).dump(1);
 }
 
-TEST(SecondReader, DecodesStandInsAsOursDoes) {
+TEST(SecondReader, DecodesProxiesAsOursDoes) {
   BundleContent content = lit_content();
-  add_stand_ins(content);
+  add_proxies(content);
   content.summary = content_summary_of(content);
   const Bytes bytes = encode(content);
   EXPECT_EQ(report(bytes), std::vector<std::string>{"good"});
-  const std::string path = std::string(::testing::TempDir()) + "stand_ins.modar";
+  const std::string path = std::string(::testing::TempDir()) + "proxies.modar";
   ASSERT_TRUE(save_bundle(content, path));
   const Answer answer = second_reader(quoted(path) + " --json");
   std::remove(path.c_str());
   ASSERT_EQ(answer.exit, 0) << answer.text;
   const auto ours = dump(*BundleView::open(bytes));
-  EXPECT_EQ(ours["stand_in_levels"].size(), 4u);
+  EXPECT_EQ(ours["proxy_levels"].size(), 4u);
   const auto theirs = nlohmann::json::parse(answer.text, nullptr, false);
   EXPECT_EQ(ours, theirs) << nlohmann::json::diff(ours, theirs).dump(1);
 }
@@ -120,6 +121,10 @@ TEST(SecondReader, AgreesOnEveryCorruptFile) {
     const std::string line = answer.text.substr(at + path.size() + 2, 80);
     const std::string theirs = line.substr(0, line.find(':'));
     const auto ours = report(read_file(path));
+    if (std::strcmp(kind.id, "PATTERN_YML_DIFFERS") == 0) {
+      EXPECT_EQ(theirs, "error PATTERN_YML_DIFFERS");  // ours compares them on a workstation alone
+      continue;
+    }
     if (ours.back() == "good") {
       EXPECT_NE(answer.text.find(path + ": good"), std::string::npos) << kind.id << ": " << line;
       continue;

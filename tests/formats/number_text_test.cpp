@@ -94,29 +94,16 @@ TEST(ShortestText, IsWhatToCharsWrites) {
   EXPECT_EQ(shortest_text(-0.0f), "-0");
 }
 
-TEST(ShortestText, ScientificIsWhatToCharsWrites) {
-  std::mt19937_64 random(7);
-  for (int i = 0; i < 10000; ++i) {
-    const double value = std::ldexp(static_cast<double>(random() >> 11), i % 200 - 150) - 1.5;
-    std::array<char, 64> text{};
-    const auto end = std::to_chars(text.data(), text.data() + text.size(), value,
-                                   std::chars_format::scientific, 16);
-    EXPECT_EQ(scientific_text(value, 16), std::string(text.data(), end.ptr));
-  }
-}
-
 TEST(NumberText, NoLocaleShows) {
   const locale_t german = newlocale(LC_NUMERIC_MASK, "de_DE.UTF-8", nullptr);
   if (german == nullptr) GTEST_SKIP() << "no locale with a decimal comma is installed";
   const locale_t before = uselocale(german);
   const std::string text = number_text(0.25);
   const std::string shortest = shortest_text(0.25);
-  const std::string scientific = scientific_text(0.25, 3);
   uselocale(before);
   freelocale(german);
   EXPECT_EQ(text, "0.25");
   EXPECT_EQ(shortest, "0.25");
-  EXPECT_EQ(scientific, "2.500e-01");
 }
 
 }  // namespace

@@ -65,7 +65,7 @@ TEST(PatternShape, FacesLieWhereTheyAreStated) {
   EXPECT_NEAR(side.at[1], 0, 1e-12);
   EXPECT_NEAR(side.at[2], -0.4, 1e-7);
   EXPECT_NEAR(side.right[2], -0.02, 1e-9);
-  // Beside all of them: the nearest one goes on.
+  // Next to all of them: the nearest one continues.
   EXPECT_NEAR(surface.at(59.5, 90).at[2], -1.2, 1e-6);
 }
 

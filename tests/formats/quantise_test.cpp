@@ -45,7 +45,7 @@ TEST(Half, EveryFloatRoundsToTheNearestEven) {
   const float up = std::numeric_limits<float>::infinity();
   for (unsigned bits = 0; bits < 0x7C00u; ++bits) {
     const double low = half_value(bits);
-    // Beyond the greatest half, rounding goes on as if the next power of two were one.
+    // Beyond the greatest half, rounding continues as if the next power of two were one.
     const double high = bits == 0x7BFFu ? 65536.0 : half_value(bits + 1);
     const auto middle = static_cast<float>((low + high) / 2);
     ASSERT_EQ(static_cast<double>(middle), (low + high) / 2);

@@ -145,7 +145,7 @@ std::map<std::string, Struct> compiled() {
                F(reserved))
   MODAR_STRUCT(ActionRecord, F(event), F(command), F(source), F(target), F(part), F(address),
                F(seconds), F(duration), F(axis), F(degrees), F(reserved))
-  MODAR_STRUCT(StandInRecord, F(model), F(first_chunk), F(chunk_count), F(reserved))
+  MODAR_STRUCT(ProxyRecord, F(model), F(first_chunk), F(chunk_count), F(reserved))
   MODAR_STRUCT(ColourGridHeader, F(columns), F(rows), F(reserved))
   MODAR_STRUCT(PatternShapeHeader, F(kind), F(face_count), F(half_arc), F(slope), F(reserved))
   MODAR_STRUCT(ShapeFaceRecord, F(place), F(corner), F(right), F(down), F(reserved))
@@ -178,7 +178,7 @@ TEST(SpecTable, SpecificationAndStructsAreTheSame) {
 
 TEST(SpecTable, FieldTableHoldsEveryField) {
   auto code = compiled();
-  // Names are values of fields; what is in a loop record is walked over as bytes.
+  // Names are values of fields; the contents of a loop record are skipped as bytes.
   for (const char* name :
        {"NameRef", "TrackerRecordHeader", "TrackerFeatureRecord", "TrackerPatchRecord"}) {
     code.erase(name);

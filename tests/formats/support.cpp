@@ -1,4 +1,4 @@
-// What it takes to damage a bundle with intent, and to tell what is wrong with it.
+// What it takes to damage a bundle with intent, and to report its faults.
 #include "tests/formats/support.hpp"
 
 #include <cstdio>

@@ -31,7 +31,7 @@ BundleContent golden_content();
 /// hides, its first pattern on a cone and its second on two faces of a box.
 void add_looks(BundleContent& content);
 
-/// An MP4 file of so many pixels and seconds without a picture in it: boxes alone, with what they
+/// An MP4 file of some pixels and seconds without a picture in it: boxes alone, with what they
 /// state. index_first: moov before mdat.
 Bytes small_mp4(std::uint16_t width, std::uint16_t height, std::uint32_t seconds,
                 bool index_first = true, std::uint8_t profile = 66);
@@ -40,9 +40,9 @@ Bytes small_sound(std::uint32_t seconds);
 
 /// Adds what version 1.3 added to that: nodes of each kind, actions of each event and command.
 void add_nodes(BundleContent& content);
-/// Adds what version 1.3 added to a content of three octahedra: two stand-ins of the first, of
+/// Adds what version 1.3 added to a content of three octahedra: two proxies of the first, of
 /// which one has two chunks, and one of the third.
-void add_stand_ins(BundleContent& content);
+void add_proxies(BundleContent& content);
 
 /// A golden_content() with all that version 1.2 added, and no section of an unknown type.
 BundleContent lit_content();

@@ -1,5 +1,7 @@
-// Which bytes may stand in a name.
+// The bytes allowed in a name.
 #include "formats/base/utf8.hpp"
+
+#include "formats/base/address.hpp"
 
 #include <gtest/gtest.h>
 
@@ -27,6 +29,35 @@ TEST(Utf8, TakesEveryPrintableCodePoint) {
     const bool surrogate = point >= 0xD800 && point < 0xE000;
     ASSERT_EQ(utf8_character(text), control || surrogate ? 0 : text.size()) << std::hex << point;
     ASSERT_EQ(utf8_character(std::string_view(text).substr(0, text.size() - 1)), 0u);
+  }
+}
+
+TEST(Addresses, LeadWhereTheyAreReadToLead) {
+  for (const char* good :
+       {"https://museum.org", "https://museum.org/vase?a=b@c#@", "https://museum.org:8443/@a",
+        "https://el.wikipedia.org/wiki/\xCE\x92\xCE\xAC\xCE\xB6\xCE\xBF",
+        "mailto:access@museum.org", "imprint.html"}) {
+    EXPECT_EQ(modar::address_fault(good), nullptr) << good;
+  }
+  for (const char* bad :
+       {"https://museum.org@evil.example", "https://a:b@evil.example/", "https://@evil.example?",
+        "http://museum.org\\@evil.example", "https://", "https:///vase", "https://?a",
+        "https://museum.org/a b", "https://museum.org/\x1B[2J", "https://museum.org/\xFF"}) {
+    EXPECT_NE(modar::address_fault(bad), nullptr) << bad;
+  }
+  // Unicode's bidirectional controls and default ignorable code points (DerivedCoreProperties.txt),
+  // next to ones that are seen.
+  for (const unsigned point :
+       {0xADu,   0x34Fu,  0x61Cu,   0x115Fu,  0x17B4u,  0x180Eu,  0x200Bu,  0x200Eu, 0x200Fu,
+        0x2028u, 0x202Au, 0x202Eu,  0x2060u,  0x2066u,  0x2069u,  0x206Fu,  0x3164u, 0xFE0Fu,
+        0xFEFFu, 0xFFA0u, 0x1BCA3u, 0x1D17Au, 0xE0001u, 0xE01EFu, 0xE0FFFu, 0x3000u}) {
+    EXPECT_NE(modar::address_fault("https://museum.org/" + encoded(point)), nullptr)
+        << std::hex << point;
+  }
+  for (const unsigned point : {0x21u, 0xA1u, 0xAEu, 0x61Bu, 0x2010u, 0x2027u, 0x2030u, 0x205Eu,
+                               0x2070u, 0xFE10u, 0xFFFCu, 0x1F600u}) {
+    EXPECT_EQ(modar::address_fault("https://museum.org/" + encoded(point)), nullptr)
+        << std::hex << point;
   }
 }
 

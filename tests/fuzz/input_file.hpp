@@ -24,7 +24,7 @@ class InputFile {
   InputFile& operator=(const InputFile&) = delete;
   ~InputFile() {
     std::error_code left;
-    std::filesystem::remove_all(folder_, left);  // and what readers made beside the file
+    std::filesystem::remove_all(folder_, left);  // and what readers made next to the file
   }
 
   /// The folder of its own.

@@ -16,7 +16,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     modar::test::need_told(key.error());
     return 0;
   }
-  // What is believed is written and read again as the same.
+  // Accepted values are written and read again as the same.
   const auto written = modar::secret_key_text(*key, "");
   need(written.has_value());
   const auto again = modar::parse_secret_key(*written, "");

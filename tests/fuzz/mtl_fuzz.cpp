@@ -19,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       }
     }
     if (!std::isfinite(m.shininess) || !std::isfinite(m.opacity)) std::abort();
-    if (!m.diffuse_map.empty() || !m.alpha_map.empty()) std::abort();  // nothing lies there
+    if (!m.diffuse_map.empty() || !m.alpha_map.empty()) std::abort();  // nothing is there
   }
   for (const modar::Diagnostic& diagnostic : diagnostics) {
     if (diagnostic.id.empty() || diagnostic.message.empty()) std::abort();

@@ -30,7 +30,7 @@ void read_packed(std::span<const std::byte> bytes) {
   const auto size = packed_recipe_size(bytes);
   if (!size) return test::need_told(size.error());
   if (*size > bytes.size()) return;
-  // Aligned, and as long as it is: the sanitizer watches the end.
+  // Aligned, and of its exact length: the sanitizer watches the end.
   const std::vector<std::byte> table(bytes.begin(),
                                      bytes.begin() + static_cast<std::ptrdiff_t>(*size));
   const auto recipe = open_packed(table);
@@ -57,7 +57,7 @@ void read_packed(std::span<const std::byte> bytes) {
   if (const auto verified = bundle->verify(); !verified) test::need_told(verified.error());
 }
 
-/// The hash of a recipe hides what lies behind it: made true first.
+/// The hash of a recipe hides the parts behind it: made true first.
 void read_rehashed(std::vector<std::byte> bytes) {
   RecipeHeader header{};
   const auto size = packed_recipe_size(bytes);

@@ -23,7 +23,7 @@ void read_recipe(std::span<const std::byte> bytes) {
   }
 }
 
-/// Sizes as a recipe may state them; the hash, which would hide what lies before it, comes last.
+/// Sizes as a recipe may state them; the hash, which would hide errors before it, comes last.
 void read_piece(std::span<const std::byte> stored, PieceForm form, std::uint32_t raw_size) {
   PieceRecord piece{};
   piece.form = static_cast<std::uint8_t>(form);
@@ -54,7 +54,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   for (const PieceForm form :
        {PieceForm::kStored, PieceForm::kZstd, PieceForm::kZstdHalves, PieceForm::kMesh,
         PieceForm::kFeatureText, PieceForm::kLevel, PieceForm::kTrackerRecord, PieceForm::kCoded}) {
-    // Garbage decodes to as much as it is asked for, a decision at a time: 64 make a run 12 ms
+    // Garbage decodes to as much as requested, a decision at a time: 64 make a run 12 ms
     // long.
     read_piece(bytes, form, (form == PieceForm::kCoded ? 4 : 64) * count);
   }

@@ -14,24 +14,24 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   if (const auto release = parse_release(text)) {
     need(release->version >= 1 && !release->bundles.empty());
-    // What is believed is written and read again as the same.
+    // Accepted values are written and read again as the same.
     const std::string written = release_text(*release);
     const auto again = parse_release(written);
     need(again.has_value() && release_text(*again) == written);
   } else {
     test::need_told(release.error());
   }
-  if (const auto link = parse_key_link(text)) {
-    const auto again = parse_key_link(key_link_text(*link));
+  if (const auto link = parse_key_rotation(text)) {
+    const auto again = parse_key_rotation(key_rotation_text(*link));
     need(again.has_value() && again->serial == link->serial && again->key == link->key);
   }
-  if (const auto word = parse_root_word(text)) {
-    const auto again = parse_root_word(root_word_text(*word));
+  if (const auto word = parse_root_metadata(text)) {
+    const auto again = parse_root_metadata(root_metadata_text(*word));
     need(again.has_value() && again->epoch == word->epoch && again->links == word->links &&
          again->key == word->key);
   }
-  if (const auto link = parse_root_link(text)) {
-    const auto again = parse_root_link(root_link_text(*link));
+  if (const auto link = parse_root_rotation(text)) {
+    const auto again = parse_root_rotation(root_rotation_text(*link));
     need(again.has_value() && again->serial == link->serial && again->roots == link->roots);
   }
   if (const auto roots = parse_root_set(text)) {
@@ -46,7 +46,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   if (const auto latest = parse_latest(text)) {
     const std::string digits = std::to_string(*latest) + "\n";
-    need(*latest > 0 && text.ends_with(digits));  // zeros may stand in front
+    need(*latest > 0 && text.ends_with(digits));  // zeros may precede
   }
   if (const auto time = parse_time(text)) need(parse_time(time_text(*time)) == *time);
   return 0;

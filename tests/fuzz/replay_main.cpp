@@ -1,4 +1,4 @@
-// Stands in for libFuzzer where it is not linked: runs a target over files, and over copies of them
+// Replaces libFuzzer where it is not linked: runs a target over files, and over copies of them
 // that are damaged in a repeatable way.
 //   fuzz_replay NAME COPIES[:SOAK] FILE|FOLDER...
 // SOAK: copies of each file under `scripts/test.sh --soak`.

@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "bake/extensions/web/page_texts.hpp"
 #include "bake/json.hpp"
-#include "bake/web/page_texts.hpp"
 #include "formats/meta_text.hpp"
 #include "tests/fuzz/need.hpp"
 
@@ -15,11 +15,11 @@ namespace {
 using modar::Json;
 using modar::test::need;
 
-/// What a page is told of a language: a name and a text.
-void need_texts(const Json& texts) {
+/// The texts of a page in a language: a text, and a name where one is given.
+void need_texts(const Json& texts, bool named) {
   for (const char* language : {"en", "de"}) {
-    const auto told = texts.find(language);
-    if (told) need(told->find("name").has_value() && told->find("text").has_value());
+    const auto found = texts.find(language);
+    if (found) need(found->find("name").has_value() == named && found->find("text").has_value());
   }
 }
 
@@ -45,11 +45,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } else {
     hold_good_meta(text);
   }
-  need_texts(modar::bundle_texts(text, "cover", {"en", "de"}));
+  need_texts(modar::bundle_texts(text, "cover", {"en", "de"}), false);
   const auto given = Json::parse(text).find("cover");
   if (!given) return 0;
   if (const auto texts = modar::given_texts(*given, "texts.json", "cover", {"en", "de"})) {
-    need_texts(*texts);
+    need_texts(*texts, true);
   } else {
     modar::test::need_told(texts.error());
   }

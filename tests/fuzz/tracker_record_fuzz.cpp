@@ -1,5 +1,5 @@
 // libFuzzer target: frames of any size, stride and content, and records of any bytes, run through
-// our pose loop without touching what is not theirs.
+// our pose loop without touching memory of others.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>

@@ -1,6 +1,7 @@
 // libFuzzer target: any bytes as one document of a release folder, the others good, read as a
-// page's worker reads them: it is told what is needed, brings it and asks again. What has a key's
-// signature is signed, so that what is fuzzed is believed. The first byte chooses the document.
+// page's worker reads them: it learns the missing files, downloads them and asks again. Documents
+// with a key's signature are signed, so that fuzzed ones are accepted. The first byte chooses the
+// document.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -82,10 +83,11 @@ Folder good_folder() {
       folder.files[signature_path(path, root.public_key)] = sign(root, text, "fuzz");
     }
   };
-  RootLink link{1, *make_root_set({roots[0].public_key, roots[1].public_key}, 2)};
-  add_root(root_link_path(1), root_link_text(link));
-  add_root("root.json", root_word_text({1, 0, public_key_line(key_of(5).public_key)}));
-  folder.add("keys/1.json", key_link_text({1, public_key_line(key_of(4).public_key)}), key_of(5));
+  RootRotation link{1, *make_root_set({roots[0].public_key, roots[1].public_key}, 2)};
+  add_root(root_rotation_path(1), root_rotation_text(link));
+  add_root("root.json", root_metadata_text({1, 0, public_key_line(key_of(5).public_key)}));
+  folder.add("keys/1.json", key_rotation_text({1, public_key_line(key_of(4).public_key)}),
+             key_of(5));
   folder.files["latest"] = "3\n";
   folder.add("releases/3.json", release_text(good_release()), key_of(4));
   folder.add(freshness_path(3), freshness_text({1, 3, kNow - 5, kNow + 500}), key_of(4));
@@ -114,7 +116,7 @@ void place(Folder& folder, std::uint8_t choice, const std::string& text) {
   }
 }
 
-/// One run after the other until nothing more is asked for, as update-worker.js does.
+/// One run after the other until nothing more is requested, as update-worker.js does.
 Result<FetchReport> run(FetchOptions options, const Folder& folder) {
   std::map<std::string, std::string> brought;
   std::vector<FileNeed> needs;
@@ -125,7 +127,7 @@ Result<FetchReport> run(FetchOptions options, const Folder& folder) {
                        const auto& take) -> Result<void> {
     const auto found = brought.find(path);
     if (found == brought.end()) {
-      return fail(kExitNetwork, "fetch.later", path, "it is yet to come", "bring it");
+      return fail(kExitNetwork, "fetch.later", path, "it is yet to come", "download it");
     }
     if (!folder.files.contains(path)) {
       return fail(kExitMixed, "fetch.missing", path, "there is no such file", "publish it");

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 
+#include "bake/extensions/studio/archive.hpp"
 #include "bake/process/process.hpp"
-#include "bake/studio/archive.hpp"
 #include "tests/fuzz/input_file.hpp"
 #include "tests/fuzz/need.hpp"
 

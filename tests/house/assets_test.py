@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds the assets against what is promised of them, and their generators against their output.
+"""Compares the assets with their promises, and their generators against their output.
 
 Sizes and counts are the article's; borders and handles follow from Euler's formula for the shapes meant.
 """
@@ -259,7 +259,7 @@ class Clip(unittest.TestCase):
 
 class Commands(unittest.TestCase):
     def test_help(self):
-        for script in ("make_patterns.py", "make_models.py", "make_church.py", "make_clip.py", "make_demo.py"):
+        for script in ("make_patterns.py", "make_models.py", "make_church.py", "make_clip.py"):
             code, words = run(script, "--help")
             self.assertEqual(code, 0, words)
             self.assertIn("usage: " + script, words)

@@ -31,7 +31,7 @@ class PlantedViolations(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, self.folder)
-        for room in ("formats", "bake/commands", "bake/import", "bake/mesh", "bake/lab", "runtime/track", "tests"):
+        for room in ("formats", "bake/commands", "bake/import", "bake/mesh", "bake/extensions/lab", "runtime/track", "tests"):
             (self.folder / room).mkdir(parents=True)
 
     def assert_refused(self, path, text, expected):
@@ -79,19 +79,24 @@ class PlantedViolations(unittest.TestCase):
         self.assert_refused("bake/commands/a.cpp", "#include <nlohmann/json.hpp>\n", "nlohmann")
 
     def test_rooms_of_the_workstation_have_an_order(self):
-        self.assert_refused("bake/mesh/a.cpp", '#include "bake/commands/commands.hpp"\n', "lies below")
-        self.assert_refused("bake/import/a.cpp", '#include "bake/mesh/weld/weld.hpp"\n', "lies below")
+        self.assert_refused("bake/mesh/a.cpp", '#include "bake/commands/commands.hpp"\n', "is below")
+        self.assert_refused("bake/import/a.cpp", '#include "bake/mesh/weld/weld.hpp"\n', "is below")
 
     def test_a_room_must_have_a_rank(self):
         self.assert_refused("bake/attic/a.cpp", '#include "bake/mesh/weld/weld.hpp"\n', "is no room")
 
     def test_the_product_knows_no_lab(self):
         for room in ("mesh", "commands"):
-            self.assert_refused(f"bake/{room}/a.cpp", '#include "bake/lab/bench.hpp"\n', "lies below")
+            self.assert_refused(f"bake/{room}/a.cpp", '#include "bake/extensions/lab/bench.hpp"\n', "is below")
+
+    def test_the_core_includes_no_extension(self):
+        for path, name in (("bake/commands/a.cpp", "bake/extensions/web/site.hpp"), ("runtime/play/a.cpp", "runtime/extensions/paper/paper_method.hpp"),
+                           ("formats/a.cpp", "runtime/extensions/web/engine.hpp")):
+            self.assert_refused(path, f'#include "{name}"\n', "of the extension")
 
     def test_of_the_lab_two_files_look_into_the_renderer(self):
-        self.assert_refused("bake/lab/pose_bench.cpp", '#include "runtime/render/draw_list.hpp"\n', "public headers")
-        (self.folder / "bake/lab/pose_bench.cpp").rename(self.folder / "bake/lab/render_bench.cpp")
+        self.assert_refused("bake/extensions/lab/pose_bench.cpp", '#include "runtime/render/draw_list.hpp"\n', "public headers")
+        (self.folder / "bake/extensions/lab/pose_bench.cpp").rename(self.folder / "bake/extensions/lab/render_bench.cpp")
         self.assertEqual(run("--root", self.folder), (0, ""))
 
     def test_rooms_are_entered_through_their_doors(self):
@@ -111,7 +116,7 @@ class PlantedViolations(unittest.TestCase):
                 self.assert_refused(path, f'#include "{name}"\n', doors)
                 (self.folder / path).unlink()
         # The lab and tests look inside.
-        for path in ("bake/lab/a.cpp", "tests/a.cpp"):
+        for path in ("bake/extensions/lab/a.cpp", "tests/a.cpp"):
             (self.folder / path).write_text('#include "bake/ship/recipe_maker.hpp"\n')
         self.assertEqual(run("--root", self.folder), (0, ""))
 
@@ -120,7 +125,7 @@ class PlantedViolations(unittest.TestCase):
         self.assertEqual(code, 0)
         lines = out.splitlines()
         self.assertLess(lines.index("bake/commands"), lines.index("bake/mesh"))
-        self.assertRegex(out, r"\n  report_page.hpp +bake/commands\n")
+        self.assertRegex(out, r"\n  model_pictures.hpp +bake/extensions/studio\n")
         self.assertNotRegex(out, r"\n  [a-z_/]+\.hpp *\n", "a door that nobody comes through")
 
     def test_no_iostream_on_the_device(self):

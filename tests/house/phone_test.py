@@ -32,7 +32,7 @@ class Phone(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, self.folder)
-        # The host's C library stands for the phone's: what depends on the processor is laid over it.
+        # The host's C library replaces the phone's: what depends on the processor is laid over it.
         for name, text in {"gnu/stubs.h": "",
                            "xlocale.h": "#include <stdlib.h>\n#include <wchar.h>\n",
                            "bits/wordsize.h": "#define __WORDSIZE (__SIZEOF_POINTER__ * 8)\n"

@@ -44,7 +44,7 @@ class Planted(unittest.TestCase):
         size = self.folder / "program.stripped"
         subprocess.run(["strip", "-o", size, self.folder / "program"], check=True)
         self.small = size.stat().st_size
-        self.ceilings.write_text(json.dumps({"program": {"ceiling": self.small + 999, "bytes": 0, "symbols": {}}}))
+        self.ceilings.write_text(json.dumps({"program": {"ceiling": self.small + 999}}))
 
     def build(self, text):
         (self.folder / "a.cpp").write_text(text)
@@ -55,6 +55,7 @@ class Planted(unittest.TestCase):
         return run("--build", self.folder, "--ceilings", self.ceilings, *more)
 
     def test_growth_is_refused_and_its_symbol_named(self):
+        self.assertEqual(self.size(), (0, f"program: {self.small} of {self.small + 999} bytes\n"))
         self.assertEqual(self.size("--update")[0], 0)
         self.assertEqual(self.size(), (0, f"program: {self.small} of {self.small + 999} bytes, +0\n"))
         self.build(LARGE)
@@ -65,7 +66,13 @@ class Planted(unittest.TestCase):
         self.assertEqual(code, 3)
         self.assertEqual(json.loads(out)[0]["grown"][0], [5000, "picture"])
 
-    def test_what_is_not_built_is_told(self):
+    def test_the_largest_symbol_is_named_where_no_size_was_recorded(self):
+        self.build(LARGE)
+        code, out = self.size()
+        self.assertEqual(code, 3)
+        self.assertEqual(out.splitlines()[1].split(), ["+5000", "picture"])
+
+    def test_a_missing_program_is_reported(self):
         code, out = run("--build", self.folder / "nowhere", "--ceilings", self.ceilings)
         self.assertEqual(code, 2)
         self.assertIn("is not built", out)

@@ -8,6 +8,7 @@ import unittest
 
 ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
 ROOMS = ("formats", "bake", "runtime", "tests")
+PAGES = ("runtime/extensions/web", "bake/extensions/studio/page")
 
 
 def files(*suffixes):
@@ -19,7 +20,8 @@ class Style(unittest.TestCase):
     def test_clang_format(self):
         if shutil.which("clang-format") is None:
             self.skipTest("no clang-format here")
-        done = subprocess.run(["clang-format", "--dry-run", "-Werror", *map(str, files(".cpp", ".hpp"))],
+        scripts = [file for folder in PAGES for file in sorted((ROOT / folder).glob("*.js"))]
+        done = subprocess.run(["clang-format", "--dry-run", "-Werror", *map(str, [*files(".cpp", ".hpp", ".java"), *scripts])],
                               capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr[:2000])
 

@@ -124,11 +124,33 @@ constexpr const char* kSkin =
     {"translation":[2,0,0],"rotation":[0,0,0.7071067811865476,0.7071067811865476]}],
     "scenes":[{"nodes":[0,1]}])";
 
+TEST_F(Gltf, HiddenNodesAreLeftOutAndMorphTargetsHaveTheirDefaultWeights) {
+  // The target is the triangle's own positions: at a weight of 0.5 it is half as large again.
+  const auto read_with = [&](const char* mesh, const char* nodes) {
+    return read(std::string(kOneTriangle) + R"("meshes":[{)" + mesh +
+                    R"("primitives":[{"attributes":{"POSITION":0},"indices":1,
+                    "targets":[{"POSITION":0}]}]}],"scenes":[{"nodes":[0]}],"nodes":)" +
+                    nodes,
+                one_triangle());
+  };
+  const char* const weights = R"("weights":[0.5],)";
+  const auto mesh = read_with(weights, R"([{"mesh":0}])");
+  ASSERT_TRUE(mesh) << to_line(mesh.error());
+  EXPECT_EQ(mesh->positions[1], glm::dvec3(1.5, 0, 0));
+  const auto node = read_with(weights, R"([{"mesh":0,"weights":[2]}])");
+  ASSERT_TRUE(node) << to_line(node.error());
+  EXPECT_EQ(node->positions[1], glm::dvec3(3, 0, 0)) << "a node's weights win";
+  const auto hidden = read_with("", R"([{"children":[1,2]},{"mesh":0},
+          {"extensions":{"KHR_node_visibility":{"visible":false}},"children":[3]},{"mesh":0}])");
+  ASSERT_TRUE(hidden) << to_line(hidden.error());
+  EXPECT_EQ(hidden->face_count(), 1u);
+}
+
 TEST_F(Gltf, SkinnedMeshesFollowTheirJoints) {
   const auto model = read(kSkin, skinned_triangle());
   ASSERT_TRUE(model) << to_line(model.error());
   ASSERT_EQ(model->positions.size(), 3u);
-  // The node's own place does not count. (1,0,0) lies at (-1,0,0) of the second joint, which the
+  // The node's own place does not count. (1,0,0) is at (-1,0,0) of the second joint, which the
   // turn takes to (0,-1,0); its weight of 2 counts as 1.
   EXPECT_LT(glm::length(model->positions[0] - glm::dvec3(0, 0, 5)), 1e-12);
   EXPECT_LT(glm::length(model->positions[1] - glm::dvec3(2, -1, 5)), 1e-12);
@@ -301,6 +323,52 @@ TEST_F(Gltf, ImageNamesArePercentDecodedAndMayBeWebp) {
   EXPECT_EQ(fs::path(model->materials[0].diffuse_map).filename(), "my wall.webp");
   EXPECT_EQ(fs::path(model->materials[1].diffuse_map).filename(), "100%.png");
   EXPECT_TRUE(model->diagnostics.empty());
+}
+
+TEST_F(Gltf, DataOfAnyStatedTypeIsReadByItsBytes) {
+  // A red PNG of one pixel.
+  const std::string picture =
+      "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/"
+      "pLvAAAAAElFTkSuQmCC";
+  const std::string buffer = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAA=";
+  for (const char* type : {"", "model/gltf-buffer", "image/png;charset=utf-8", "image/jpg"}) {
+    std::ofstream(folder_ / "a.gltf")
+        << R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":44,"uri":"data:)" << type
+        << ";base64," << buffer << R"("}],)" << kOneTriangle
+        << R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],
+          "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}],"textures":[{"source":0}],
+          "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],
+          "images":[{"uri":"data:)"
+        << type << ";base64," << picture << R"("}]})";
+    const auto model = read_gltf((folder_ / "a.gltf").string());
+    ASSERT_TRUE(model) << type << to_line(model.error());
+    EXPECT_TRUE(read_image(model->materials[0].diffuse_map)) << type;
+    EXPECT_TRUE(model->files.empty()) << type;
+  }
+  std::ofstream(folder_ / "a.gltf")
+      << R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":4,"uri":"data:)"
+      << std::string(5000, 'x') << "\"}]}";
+  const auto broken = read_gltf((folder_ / "a.gltf").string());
+  ASSERT_FALSE(broken);
+  EXPECT_LT(to_line(broken.error()).size(), 600u);
+}
+
+TEST_F(Gltf, BuffersAndImagesAreFoundWhereOthersAre) {
+  fs::create_directories(folder_ / "textures");
+  std::ofstream(folder_ / "textures" / "Wall.PNG") << "png";
+  std::ofstream(folder_ / "Mesh 1.bin", std::ios::binary) << one_triangle();
+  std::ofstream(folder_ / "a.gltf")
+      << R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":44,"uri":"C:\\me\\mesh%201.bin"}],)"
+      << kOneTriangle
+      << R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],
+          "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}],"textures":[{"source":0}],
+          "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],
+          "images":[{"uri":"maps\\wall.png"}]})";
+  const auto model = read_gltf((folder_ / "a.gltf").string());
+  ASSERT_TRUE(model) << to_line(model.error());
+  EXPECT_EQ(fs::path(model->materials[0].diffuse_map).filename(), "Wall.PNG");
+  ASSERT_EQ(model->diagnostics.size(), 1u);
+  EXPECT_EQ(model->diagnostics[0].id, "model.found-elsewhere");
 }
 
 TEST_F(Gltf, PicturesAndModesOfAlphaAreFoldedIntoTheColour) {

@@ -55,9 +55,35 @@ TEST_F(MtlReader, FindsFilesHoweverTheyAreWritten) {
   EXPECT_EQ(found("C:\\Users\\me\\textures\\wood.jpg"), "wood.jpg");
   EXPECT_EQ(found("/home/me/wood.jpg"), "wood.jpg");
   EXPECT_EQ(found("-odd.png"), "-odd.png");
+  EXPECT_EQ(found("C:\\Users\\me\\Maps\\stone.png"), "Maps/Stone.PNG");
+  EXPECT_EQ(found("two%20words.png"), "two words.png");
   EXPECT_EQ(found("stone.jpg"), "");
   EXPECT_EQ(found("Maps"), "");
   EXPECT_EQ(found(""), "");
+}
+
+TEST_F(MtlReader, FindsFilesInFoldersOfTexturesAndInOtherEncodings) {
+  fs::create_directories(folder_ / "scene/textures");
+  fs::create_directories(folder_ / "textures");
+  std::ofstream(folder_ / "scene/textures/inside.png") << "x";
+  std::ofstream(folder_ / "textures/above.png") << "x";
+  std::ofstream(folder_ / "scene/Gefa\xCC\x88\xC3\x9F.png")
+      << "x";  // a and its mark, as macOS has it
+  const auto found_in = [&](const char* name) {
+    const std::string path = find_named_file(name, (folder_ / "scene/").string());
+    return path.empty() ? path : fs::relative(path, folder_).string();
+  };
+  EXPECT_EQ(found_in("inside.png"), "scene/textures/inside.png");
+  EXPECT_EQ(found_in("D:\\work\\inside.png"), "scene/textures/inside.png");
+  EXPECT_EQ(found_in("above.png"), "textures/above.png");
+  const std::string marked = "scene/Gefa\xCC\x88\xC3\x9F.png";
+  EXPECT_EQ(found_in("Gef\xC3\xA4\xC3\x9F.png"), marked) << "one character";
+  EXPECT_EQ(found_in("Gef\xE4\xDF.png"), marked) << "cp1252";
+  EXPECT_EQ(found_in("Gefo\xCC\x88\xC3\x9F.png"), "");
+  EXPECT_EQ(find_named_file("above.png", ModelFolder((folder_ / "scene/").string(),
+                                                     (folder_ / "scene").string())),
+            "")
+      << "outside of what may be read";
 }
 
 TEST_F(MtlReader, OptionsAreNoPartOfTheName) {
@@ -74,13 +100,13 @@ TEST_F(MtlReader, OptionsAreNoPartOfTheName) {
 TEST_F(MtlReader, ReadsProperties) {
   const auto m = parse(
       "\xEF\xBB\xBF# comment\r\nKd 9 9 9\r\n"
-      "newmtl  a b \r\n\tKa .1 .2 .3\r\nKd 0.5\r\nKs 1 1 \\\n 0.25\nKe 0 0 1\nNs 96\n"
+      "newmtl  a b \r\n\tKa .1 .2 .3\r\nKd 0.5 0.4 0.3\r\nKs 1 1 \\\n 0.25\nKe 0 0 1\nNs 96\n"
       "Tr 0.25\nd 0.5\nTr 0.9\nmap_Kd Maps\\stone.png\n"
       "newmtl c\nTr 0.25\nmap_Kd missing.png\nnewmtl d\nTr 1.0");
   ASSERT_EQ(m.size(), 3u);
   EXPECT_EQ(m[0].name, "a b");
   EXPECT_EQ(m[0].ambient, glm::vec3(0.1f, 0.2f, 0.3f));
-  EXPECT_EQ(m[0].diffuse, glm::vec3(0.5f));
+  EXPECT_EQ(m[0].diffuse, glm::vec3(0.5f, 0.4f, 0.3f));
   EXPECT_EQ(m[0].specular, glm::vec3(1, 1, 0.25f));
   EXPECT_EQ(m[0].emission, glm::vec3(0, 0, 1));
   EXPECT_EQ(m[0].shininess, 96.0f);
@@ -132,12 +158,56 @@ TEST_F(MtlReader, ReflectionFollowsFromWhatTheMaterialStates) {
 
 TEST_F(MtlReader, APictureAloneIsSeenAsItIs) {
   const auto m = parse(
-      "newmtl bare\nmap_Kd wood.jpg\nnewmtl tint\nKd 0.5\nmap_Kd wood.jpg\n"
+      "newmtl bare\nmap_Kd wood.jpg\nnewmtl tint\nKd 0.5 0.4 0.3\nmap_Kd wood.jpg\n"
       "newmtl no");
   ASSERT_EQ(m.size(), 3u);
   EXPECT_EQ(m[0].diffuse, glm::vec3(1.0f));
-  EXPECT_EQ(m[1].diffuse, glm::vec3(0.5f));
+  EXPECT_EQ(m[1].diffuse, glm::vec3(0.5f, 0.4f, 0.3f));
   EXPECT_EQ(m[2].diffuse, glm::vec3(kClay));
+}
+
+TEST_F(MtlReader, MaterialsAreWhatExportersMean) {
+  // In each the program that writes such a file shows the unchanged picture.
+  const auto m = parse(
+      "newmtl maya\nKd 0 0 0\nmap_Kd wood.jpg\nnewmtl meshroom\nKd 0.6 0.6 0.6\nmap_Kd wood.jpg\n"
+      "newmtl ambient\nmap_Ka wood.jpg\nnewmtl glow\nKd 0 0 0\nKe 1 1 1\nmap_Ke wood.jpg\n"
+      "newmtl mask\nKd 0.2 0.6 0.2\nmap_d wood.jpg\n");
+  ASSERT_EQ(m.size(), 5u);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(m[i].diffuse, glm::vec3(1.0f)) << m[i].name;
+    EXPECT_EQ(fs::path(m[i].diffuse_map).filename(), "wood.jpg") << m[i].name;
+    EXPECT_EQ(m[i].emission, glm::vec3(0.0f)) << m[i].name;
+  }
+  EXPECT_EQ(m[4].diffuse, glm::vec3(0.2f, 0.6f, 0.2f));
+  ASSERT_EQ(findings_.size(), 1u);
+  EXPECT_EQ(findings_[0].id, "mtl.opacity-map");
+  EXPECT_TRUE(
+      parse_mtl(std::string("\xFF\xFEn\0e\0", 6), folder_.string(), "m.mtl", findings_).empty());
+  EXPECT_EQ(findings_.back().id, "mtl.utf16");
+}
+
+TEST_F(MtlReader, MapsAreScaledAndShiftedAsWritten) {
+  std::ofstream(folder_ / "m.mtl") << "newmtl a\nmap_Kd -s 3 2 1 -o 0.5 0.25 0 wood.jpg\n";
+  std::ofstream(folder_ / "m.obj") << "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\n"
+                                      "vt 0 1\nf 1/1 2/2 3/3\nusemtl a\nf 1/1 2/2 3/3\n";
+  const auto model = read_model((folder_ / "m.obj").string(), {});
+  ASSERT_TRUE(model) << to_line(model.error());
+  const glm::dvec2 wanted[] = {{0, 0}, {1, 0}, {0, 1}, {0.5, 0.25}, {3.5, 0.25}, {0.5, 2.25}};
+  for (std::size_t c = 0; c < 6; ++c) {
+    EXPECT_EQ(model->uvs[model->corner(c).uv], wanted[c])
+        << c;  // three.js r170: uv * repeat + offset
+  }
+  EXPECT_TRUE(model->diagnostics.empty());
+}
+
+TEST_F(MtlReader, AMaterialThatNoFaceNamesIsUsed) {
+  std::ofstream(folder_ / "m.mtl") << "newmtl material_0\nmap_Kd wood.jpg\n";
+  std::ofstream(folder_ / "m.obj") << "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  const auto model = read_model((folder_ / "m.obj").string(), {});
+  ASSERT_TRUE(model) << to_line(model.error());
+  ASSERT_EQ(model->materials.size(), 1u);
+  EXPECT_EQ(fs::path(model->materials[0].diffuse_map).filename(), "wood.jpg");
+  EXPECT_EQ(model->diagnostics.at(0).id, "obj.no-usemtl");
 }
 
 TEST_F(MtlReader, TheMeanOfATextureIsNotMultipliedByIt) {
@@ -164,7 +234,7 @@ TEST_F(MtlReader, TheMeanOfATextureIsNotMultipliedByIt) {
   EXPECT_EQ(model->materials[1].diffuse, glm::vec3(1.0f));
   EXPECT_EQ(model->materials[1].ambient, glm::vec3(1.0f));
   EXPECT_EQ(model->materials[2].diffuse, glm::vec3(0.5882f, 0.1961f, 0.2f));
-  EXPECT_EQ(model->materials[3].diffuse, glm::vec3(0.5f));
+  EXPECT_EQ(model->materials[3].diffuse, glm::vec3(1.0f)) << "gray is not multiplied";
   EXPECT_EQ(model->materials[4].diffuse, glm::vec3(0.5882f, 0.1961f, 0.0980f));
   ASSERT_EQ(model->diagnostics.size(), 1u);
   EXPECT_EQ(model->diagnostics[0].id, "mtl.mean-colour");
@@ -236,7 +306,7 @@ TEST_F(MtlReader, APictureOfTheModelsOwnNameIsItsTextureIfItsSidesArePowersOfTwo
     return fs::path(model ? model->materials[1].diffuse_map : "none").filename().string();
   };
   write_textured(folder_ / "pawn.obj");
-  picture("pawn.png", 48, 32);  // a photo, or the print that it stands on
+  picture("pawn.png", 48, 32);  // a photo, or the print that it is on
   EXPECT_EQ(texture(), "");
   picture("pawn.png", 64, 32);
   EXPECT_EQ(texture(), "pawn.png");

@@ -22,7 +22,7 @@ Parsed parse_text(const std::string& text) {
   const std::string padded = text + std::string(kTextPadding, '\0');
   Parsed result;
   const char* end =
-      take_real(padded.data(), padded.data() + text.size(), result.value, result.kind);
+      parse_real(padded.data(), padded.data() + text.size(), result.value, result.kind);
   result.length = static_cast<std::size_t>(end - padded.data());
   return result;
 }
@@ -107,7 +107,19 @@ TEST(NumberParser, StopsAtWhatBelongsToNoNumber) {
   EXPECT_EQ(parse_text("3.1+e2").length, 3u);
   EXPECT_EQ(parse_text("1.5.5").length, 3u);
   EXPECT_EQ(parse_text("7/8").length, 1u);
-  EXPECT_EQ(parse_text("1,5").length, 1u);
+  EXPECT_EQ(parse_text("1, 5").length, 1u);
+  EXPECT_EQ(parse_text("1,5,5").length, 3u);
+}
+
+TEST(NumberParser, CommasBetweenDigitsArePoints) {
+  for (const auto& [text, value] :
+       {std::pair{"1,5", 1.5}, std::pair{"-0,600000024", -0.600000024},
+        std::pair{"+2,5E-3", 2.5e-3},
+        std::pair{"123456789012345678901,5", 123456789012345678901.5}}) {
+    const Parsed parsed = parse_text(text);
+    EXPECT_EQ(parsed.value, value) << text;
+    EXPECT_EQ(parsed.length, std::string(text).size()) << text;
+  }
 }
 
 }  // namespace

@@ -25,15 +25,4 @@ std::vector<std::string> assimp_obj_files() {
   return obj_files_below("/usr/share/assimp/models/OBJ");
 }
 
-std::string shared_data() {
-  std::string folder;
-  if (const char* named = std::getenv("MODAR_SHARED_DATA")) {
-    folder = named;
-  } else if (const char* source = std::getenv("MODAR_SOURCE_DIR")) {
-    folder = std::string(source) + "/../shared/data";
-  }
-  std::error_code error;
-  return !folder.empty() && fs::is_directory(folder, error) ? folder : std::string();
-}
-
 }  // namespace modar::testing

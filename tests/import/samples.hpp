@@ -9,9 +9,6 @@ namespace modar::testing {
 /// All .obj files of Debian's assimp-testmodels, sorted; empty where it is not installed.
 std::vector<std::string> assimp_obj_files();
 
-/// The folder of real models outside of the repository, or empty where there is none.
-std::string shared_data();
-
 /// All .obj files below a folder, sorted.
 std::vector<std::string> obj_files_below(const std::string& folder);
 

@@ -79,18 +79,17 @@ TEST(Stl, BinaryAndTextAreTheSame) {
   }
 }
 
-TEST(Stl, SharpEdgesStaySharpAndRoundOnesAreSmooth) {
-  const auto sharp = parse_stl(binary_stl(roof(90)), "a.stl");
-  const auto round = parse_stl(binary_stl(roof(150)), "a.stl");
-  ASSERT_TRUE(sharp && round);
-  const auto normal = [](const SourceModel& model, std::size_t corner) {
-    return model.normals[model.corner_normals.own[corner]];
-  };
-  EXPECT_LT(normal(*sharp, 0).x, -0.7f);  // the left slope looks left
-  EXPECT_GT(normal(*sharp, 3).x, 0.7f);
-  EXPECT_NEAR(normal(*round, 0).x, 0, 1e-6);  // the ridge looks up
-  EXPECT_NEAR(normal(*round, 0).z, 1, 1e-6);
-  EXPECT_LT(normal(*round, 2).x, -0.2f);  // the eaves are the slope's
+TEST(Stl, BytesBehindTheFacetsAndAMarkBeforeTheTextArePassedOver) {
+  const auto read =
+      parse_stl(binary_stl(roof(60), "solid written here") + std::string("\0\n", 2), "a.stl");
+  ASSERT_TRUE(read) << to_line(read.error());
+  EXPECT_EQ(read->face_count(), 2u);
+  const auto text = parse_stl(
+      "\xEF\xBB\xBFsolid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+      "vertex 0 1 0\nendloop\nendfacet\nendsolid a\n",
+      "a.stl");
+  ASSERT_TRUE(text) << to_line(text.error());
+  EXPECT_EQ(text->face_count(), 1u);
 }
 
 TEST(ReadModel, ColoursOfVerticesAreSeenAsTheyAre) {
@@ -221,6 +220,37 @@ TEST(Ply, CornersWithUvsOfTheirOwnAndStrips) {
   }
 }
 
+TEST(Ply, FacesHaveColoursAndTextIsAnElementALine) {
+  const std::string vertices =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 2\nproperty list uchar int vertex_indices\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
+      "0 0 0 9 9\n1 0 0 9 9\n1 1 0 9 9\n0 1 0 9 9\n";
+  const auto read = parse_ply(vertices + "3 0 1 2 255 0 0\n3 0 2 3 0 0 255\n", "a.ply");
+  ASSERT_TRUE(read) << to_line(read.error());
+  ASSERT_EQ(read->face_count(), 2u);
+  ASSERT_EQ(read->positions.size(), 6u) << "two of them in two colours";
+  for (std::size_t c = 0; c < 6; ++c) {
+    EXPECT_EQ(read->colours[read->corner_positions[c]],
+              c < 3 ? glm::vec3(1, 0, 0) : glm::vec3(0, 0, 1));
+  }
+  EXPECT_EQ(read->positions[read->corner_positions[5]], glm::dvec3(0, 1, 0));
+  // MeshLab's lists of corners' colours, of which its header knows nothing.
+  const auto lists =
+      parse_ply(vertices + "3 0 1 2 9 1 1 1 1 1 1 1 1 1\r\n3 0 2 3 9 1 1 1 1 1 1 1 1 1\n", "a.ply");
+  ASSERT_TRUE(lists) << to_line(lists.error());
+  EXPECT_EQ(lists->face_count(), 2u);
+  EXPECT_TRUE(lists->colours.empty());
+  const auto floats = parse_ply(
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float red\nproperty float green\nproperty float blue\nelement face 1\n"
+      "property list uchar int vertex_indices\nend_header\n"
+      "0 0 255 0 51\n1 0 255 0 51\n0 1 255 0 51\n3 0 1 2\n",
+      "a.ply");
+  ASSERT_TRUE(floats) << to_line(floats.error());
+  EXPECT_EQ(floats->colours[1], glm::vec3(1.0f, 0.0f, 0.2f));
+}
+
 TEST(Ply, RefusesWhatIsNone) {
   const std::string header =
       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
@@ -256,6 +286,13 @@ TEST(Ply, RefusesWhatIsNone) {
       "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n", "a.ply");
   ASSERT_FALSE(points);
   EXPECT_EQ(points.error().code, "ply.no-faces");
+  EXPECT_NE(points.error().cure.find("mesh the point cloud"), std::string::npos);
+  const auto splat = parse_ply(
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float f_dc_0\n"
+      "property float scale_0\nproperty float rot_0\nend_header\n0 0 0 0\n",
+      "a.ply");
+  ASSERT_FALSE(splat);
+  EXPECT_NE(splat.error().cure.find("Gaussian splat"), std::string::npos);
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 #include "tests/import/tiny_obj.hpp"
 
 #ifdef MODAR_HAVE_TINYOBJ
-#include "bake/lab/tinyobj_library.hpp"
+#include "bake/extensions/lab/tinyobj_library.hpp"
 #endif
 
 namespace modar::testing {

@@ -196,7 +196,7 @@ struct Centre {
   std::array<int, 3> at{};
 };
 
-/// Are all of `front` lower than all of `behind` along one axis? What is level goes by the file.
+/// Are all of `front` lower than all of `behind` along one axis? The file decides the upright axis.
 bool divided(std::span<const std::vector<Centre>> front,
              std::span<const std::vector<Centre>> behind, std::size_t axis) {
   using Place = std::pair<int, std::uint32_t>;

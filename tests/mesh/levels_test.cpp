@@ -217,7 +217,7 @@ Place place_of(const glm::dvec3& p) {
 }
 
 /// twice: places on a seam, with a vertex of each side. At every level of the only chunk, the seam
-/// is there from both sides or from neither, no edge that one triangle has lies inside the grid,
+/// is there from both sides or from neither, no edge that one triangle has is inside the grid,
 /// and the coarsest level has a simpler seam.
 void expect_closed_seam(const ChunkedMesh& split, const std::set<Place>& twice) {
   const Chunk& chunk = split.chunks[0];
@@ -582,7 +582,7 @@ TEST(Levels, GoOnUntilTheModelIsAFewPixelsWide) {
     ASSERT_TRUE(make_levels(split, options, report));
     std::uint64_t drawn = 0;
     for (const Chunk& chunk : split.chunks) {
-      // What is off by no more than a pixel where the ball, of 2, is 13 pixels across.
+      // A level off by no more than a pixel where the ball, of 2, is 13 pixels across.
       std::uint64_t indices = chunk.indices.size();
       for (const ChunkLevel& level : chunk.coarser) {
         if (level.error * 6.5 <= 1.0) indices = level.indices.size();
@@ -612,13 +612,13 @@ TEST(Levels, DistancesOfKnownSurfaces) {
     EXPECT_GE(down, 0.5 * std::sqrt(0.5));
     EXPECT_LE(down, 0.75 * std::sqrt(0.5));
     EXPECT_LE(surface_distance(low, low, nearby, 0), kDistanceFloor);
-    // What is below the least that a caller asks for is not told apart.
+    // Values below the caller's least are not distinguished.
     EXPECT_EQ(surface_distance(low, high, nearby, 2.0), 2.0);
   }
 }
 
 TEST(Levels, DistancesWhereCornersDoNotTell) {
-  // All corners of a square lie on another one, which has a slit.
+  // All corners of a square are on another one, which has a slit.
   const std::vector<glm::dvec3> p = {{0, 0, 0},   {1, 0, 0},   {1, 1, 0},   {0, 1, 0},
                                      {0.8, 0, 0}, {0.8, 1, 0}, {0.9, 0, 0}, {0.9, 1, 0}};
   const std::vector<std::uint16_t> square = {0, 1, 2, 0, 2, 3};
@@ -628,7 +628,7 @@ TEST(Levels, DistancesWhereCornersDoNotTell) {
   const double gap = surface_distance(LevelSurface(p, square), with_slit, near, 0);
   EXPECT_GE(gap, 0.05 - 1e-9);
   EXPECT_LE(gap, 0.075);
-  // The middle of a square lies under a roof, farther off than a triangle elsewhere is.
+  // The middle of a square is under a roof, farther off than a triangle elsewhere is.
   const std::vector<glm::dvec3> q = {{0, 0, 0},       {1, 0, 0},    {1, 1, 0},   {0, 1, 0},
                                      {0.5, 0.5, 0.3}, {3, 0, 0},    {4, 0, 0},   {3, 1, 0},
                                      {3, 0, 0.22},    {4, 0, 0.22}, {3, 1, 0.22}};
@@ -823,7 +823,7 @@ TEST(Levels, DistancesOfWhatTheFinerLevelDoesNotCover) {
        {0, 1, 4, 1, 2, 4},
        {0, 0, 1, 0, 0},
        0.4 / std::sqrt(0.89)},  // from (0.5, 1) to the line through (1, 1) and (0.5, 0.2)
-      {"a triangle beside the border",
+      {"a triangle next to the border",
        {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {-1, 2, 0}},
        {0, 1, 2},
        {0, 1, 2, 0, 2, 3},
@@ -869,7 +869,7 @@ TEST(Levels, AlikeLevelsAreOne) {
   ChunkedMesh mesh;
   Chunk& chunk = mesh.chunks.emplace_back();
   // Errors, what the shading shows, and whether the level stays: the next that does is compared, or
-  // the stand-in (0.52).
+  // the proxy (0.52).
   const std::vector<std::tuple<double, double, bool>> levels = {
       {0.1, 0.0, true},  {0.2, 0.0, false}, {0.21, 0.0, false}, {0.22, 0.0, true},
       {0.4, 0.0, false}, {0.4, 0.42, true}, {0.5, 0.0, false}};
@@ -887,7 +887,7 @@ TEST(Levels, AlikeLevelsAreOne) {
 TEST(Levels, WhatShadesABendWiderIsNoCloseLevel) {
   // A sheet, flat and with a bend in its middle: levels of both are exact in place.
   for (const double rise : {0.0, 0.5}) {
-    std::string text;
+    std::string text = "s 1\n";
     constexpr int kSide = 41;
     for (int i = 0; i < kSide * kSide; ++i) {
       text += "v " + std::to_string(i % kSide) + " " + std::to_string(i / kSide) + " " +
@@ -952,7 +952,7 @@ TEST(Levels, PixelsAreAsLargeAsWhatDiffersInThem) {
   // One of 100 points may differ, two may not.
   EXPECT_EQ(pixel([&](int x, int y) { return normal(x % 16 + y % 8 == 0 ? 1.0f : 0.0f); }), 0.0);
   EXPECT_GT(pixel([&](int x, int y) { return normal(x % 8 + y % 6 == 0 ? 1.0f : 0.0f); }), kStep);
-  // Colours count as they are; a texture's slide by the pixels that it is wide.
+  // Colours count directly; a texture's slide by the pixels that it is wide.
   LookDifference colour;
   colour.colour = {0.0f, 1.5f, 0.0f};
   EXPECT_EQ(pixel([&](int, int) { return colour; }), 0.0);
@@ -1052,6 +1052,14 @@ TEST(Levels, ThreadsChangeNothing) {
   for (std::size_t l = 0; l < one.levels.size(); ++l) {
     EXPECT_EQ(one.levels[l].error, eight.levels[l].error);
   }
+}
+
+TEST(Stages, SayThatNothingIsLeft) {
+  Report report;
+  EXPECT_EQ(chunk({}, {}, report).error().code, "model.empty");
+  ChunkedMesh nothing;
+  EXPECT_EQ(make_levels(nothing, {}, report).error().code, "model.empty");
+  EXPECT_EQ(pack(nothing, {}, {}, report).error().code, "model.no-area");
 }
 
 TEST(Levels, LevelZeroAndVerticesAreThoseWithoutLevels) {

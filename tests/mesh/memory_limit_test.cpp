@@ -102,7 +102,7 @@ TEST(MemoryLimit, ModelsAreTheSame) {
     return testing::packed(testing::chunked(testing::welded(testing::parse(text)), 5000));
   };
   const PackedMesh plain = pack_all();
-  const auto limit = MemoryLimit::start(folder(), MemoryLimit::kLeast);
+  const auto limit = MemoryLimit::start(folder(), MemoryLimit::kMinMemoryLimit);
   ASSERT_TRUE(limit);
   const PackedMesh out_of_core = pack_all();
   EXPECT_EQ(plain.vertices, out_of_core.vertices);

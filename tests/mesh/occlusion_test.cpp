@@ -13,7 +13,7 @@ using namespace modar::testing;
 /// A grid of `side` x `side` squares; height(x, y) over the square [-1,1].
 template <class Height>
 std::string grid(int side, const Height& height) {
-  std::string text;
+  std::string text = "s 1\n";
   for (int y = 0; y <= side; ++y) {
     for (int x = 0; x <= side; ++x) {
       const double px = 2.0 * x / side - 1;

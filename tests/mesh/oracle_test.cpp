@@ -57,7 +57,7 @@ SurfaceFigures figures_of(const SourceModel& model) {
 const std::map<std::string, std::string>& known_differences() {
   static const std::map<std::string, std::string> known = {
       {"cube-vertex-w-component.obj", "it divides by the weight, which is for curves alone"},
-      {"test-nan.obj", "it makes infinities of what is no number"}};
+      {"test-nan.obj", "it makes infinities of NaN"}};
   return known;
 }
 
@@ -94,13 +94,6 @@ TEST(Eyes, AssimpReadsTheSame) {
   std::vector<std::string> files = own_models();
   ASSERT_FALSE(files.empty());
   for (const std::string& path : testing::assimp_obj_files()) files.push_back(path);
-  if (const std::string shared = testing::shared_data(); !shared.empty()) {
-    for (const char* folder : {"/models", "/odd_obj"}) {
-      for (const std::string& path : testing::obj_files_below(shared + folder)) {
-        files.push_back(path);
-      }
-    }
-  }
   std::size_t compared = 0;
   for (const std::string& path : files) {
     if (!soak() && fs::file_size(path) > 3'000'000) continue;
@@ -224,7 +217,7 @@ void expect_rays_agree(const std::vector<Corners>& from, const std::vector<Corne
     const glm::dvec3 point = start + nearest * along;
     double least = std::numeric_limits<double>::infinity();
     for (const Corners& t : to) {
-      // What is farther than the bound in one coordinate alone cannot be it.
+      // A point farther than the bound in one coordinate cannot be it.
       const glm::dvec3 near = glm::clamp(point, glm::min(t[0], glm::min(t[1], t[2])),
                                          glm::max(t[0], glm::max(t[1], t[2])));
       if (glm::length(near - point) < least) least = std::min(least, distance_from(point, t));
@@ -257,7 +250,7 @@ void expect_bounds_hold(const PackedMesh& mesh, const std::string& what) {
         const glm::dvec3 n = glm::cross(t[1] - t[0], t[2] - t[0]);
         if (glm::length(n) == 0) continue;
         // The widest direction that is ruled out stands acos(cutoff) from the axis; the normal may
-        // stand no farther from the axis than what is left of a right angle.
+        // stand no farther from the axis than the rest of a right angle.
         const double apart = std::atan2(glm::length(glm::cross(n, axis)), glm::dot(n, axis));
         const double ruled = std::acos(static_cast<double>(chunk.cone_cutoff));
         ASSERT_LE(apart + ruled, 1.5707963267948966) << what;
@@ -293,7 +286,7 @@ Rim rim_of(const PackedMesh& mesh, const ChunkRecord& chunk, std::uint32_t l) {
   return edges;
 }
 
-/// What chunks share stays at every level, and what a coarser level opens lies on the model's own
+/// What chunks share stays at every level, and what a coarser level opens is on the model's own
 /// rim.
 void expect_no_cracks(const PackedMesh& mesh, const std::string& what) {
   std::map<std::pair<Point, Point>, int> chunks_at;  // of each edge of the finest level
@@ -359,16 +352,6 @@ TEST(Eyes, RaysBoxesConesAndCracksOfOurOwnModels) {
     if (!soak() && fs::file_size(path) > 1'000'000) continue;
     look_at(path, PositionKind::kHalf, soak() ? 400 : 60);
     look_at(path, PositionKind::kInt16, soak() ? 400 : 60);
-  }
-}
-
-TEST(Eyes, RaysBoxesConesAndCracksOfScans) {
-  const std::string shared = testing::shared_data();
-  if (shared.empty()) GTEST_SKIP() << "no shared data";
-  for (const std::string& path : testing::obj_files_below(shared + "/models")) {
-    if (!soak() && fs::file_size(path) > 800'000) continue;
-    look_at(path, PositionKind::kHalf, soak() ? 200 : 30);
-    look_at(path, PositionKind::kInt16, soak() ? 200 : 30);
   }
 }
 

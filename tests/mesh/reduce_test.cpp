@@ -1,4 +1,4 @@
-// A mesh with fewer triangles: how many, what stays closed, what is stated of the loss.
+// A mesh with fewer triangles: how many, what stays closed, the stated loss.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,7 +26,7 @@ std::tuple<double, double, double> key(const glm::dvec3& p) {
   return {p.x, p.y, p.z};
 }
 
-/// Edges, by position, of one triangle alone must lie on the outline of the grid.
+/// Edges, by position, of one triangle alone must be on the outline of the grid.
 void expect_closed_inside(const TriMesh& mesh) {
   std::map<std::set<std::tuple<double, double, double>>, int> uses;
   for (const auto& t : mesh.triangles) {

@@ -70,4 +70,11 @@ inline std::string grid(int n, int materials) {
   return text;
 }
 
+/// Moved to where maps count metres (UTM): floats there are half a metre apart.
+inline SourceModel on_a_map(SourceModel model) {
+  for (glm::dvec3& position : model.positions)
+    position += glm::dvec3(349011.8489, 6648378.3181, 9.7628);
+  return model;
+}
+
 }  // namespace modar::testing

@@ -135,7 +135,7 @@ TEST(ParallelRays, MeetWhatRaysOfATreeMeet) {
   ParallelRays rays(origins, normals, corners, triangles);
   int met = 0;
   for (const glm::vec3& axis : {glm::vec3(0, 0, 1), glm::normalize(glm::vec3(1, -2, 0.5f))}) {
-    rays.cast(axis, {0.01f, 0.9f});
+    ASSERT_TRUE(rays.cast(axis, {0.01f, 0.9f}));
     ASSERT_EQ(rays.size(), origins.size());
     std::vector<bool> seen(origins.size());
     for (std::size_t i = 0; i < rays.size(); ++i) {

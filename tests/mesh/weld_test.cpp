@@ -124,7 +124,7 @@ TEST(Weld, MakesNormalsWithinSmoothingGroups) {
   const std::string walls = "v 0 0 0\nv 0 1 0\nv 1 0 0\nv 1 1 0\nv 0 0 1\nv 0 1 1\n";
   const std::string a = "f 1 2 4 3\n";
   const std::string b = "f 1 5 6 2\n";
-  const TriMesh smooth = welded(parse(walls + a + b));
+  const TriMesh smooth = welded(parse(walls + "s 1\n" + a + b));
   EXPECT_EQ(smooth.positions.size(), 6u);
   for (std::size_t v = 0; v < smooth.positions.size(); ++v) {
     if (smooth.source_position(static_cast<std::uint32_t>(v)) > 1) continue;
@@ -169,7 +169,8 @@ TEST(Weld, NormalsAreWeighedByAreaAndAngle) {
     faces += "\n";
     faces_with_uv += "\n";
   }
-  for (const std::string& text : {vertices + faces, "vt 0 0\n" + vertices + faces_with_uv}) {
+  for (const std::string& text :
+       {vertices + "s 1\n" + faces, "vt 0 0\n" + vertices + "s 1\n" + faces_with_uv}) {
     const TriMesh mesh = welded(parse(text));
     for (std::size_t v = 0; v < mesh.normals.size(); ++v) {
       const std::size_t source = mesh.source_positions.empty() ? v : mesh.source_positions[v];
@@ -177,6 +178,98 @@ TEST(Weld, NormalsAreWeighedByAreaAndAngle) {
       EXPECT_LT(glm::length(glm::dvec3(mesh.normals[v]) - wanted), 1e-5) << v;
     }
   }
+}
+
+/// A roof of two sloping sides whose faces meet at the angle, ridge along y.
+std::string roof(double degrees) {
+  const double slope = degrees / 2 * 3.14159265358979 / 180;
+  const std::string x = std::to_string(std::cos(slope));
+  const std::string z = std::to_string(-std::sin(slope));
+  return "v 0 0 0\nv 0 1 0\nv -" + x + " 0 " + z + "\nv -" + x + " 1 " + z + "\nv " + x + " 0 " +
+         z + "\nv " + x + " 1 " + z + "\nf 1 2 4 3\nf 2 1 5 6\n";
+}
+
+TEST(Weld, EdgesAboveTheCreaseStaySharp) {
+  const auto vertices = [](const std::string& text, double crease) {
+    Report report;
+    return weld(parse(text), report, {1, crease})->positions.size();
+  };
+  EXPECT_EQ(vertices(roof(39.9), 40), 6u);
+  EXPECT_EQ(vertices(roof(40.1), 40), 8u);
+  EXPECT_EQ(vertices(roof(40.1), 180), 6u);
+  EXPECT_EQ(vertices(roof(20), 10), 8u);
+  EXPECT_EQ(vertices("s 1\n" + roof(90), 40), 6u) << "a stated group wins";
+  // With uvs of their own, corners are welded the other way.
+  const std::string cube =
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nvt 0 0\n";
+  for (const char* uv : {"", "/1"}) {
+    std::string text = cube;
+    for (const char* face : {"4321", "5678", "1265", "2376", "3487", "4158"}) {
+      text += "f";
+      for (int i = 0; i < 4; ++i) text += " " + std::string(1, face[i]) + uv;
+      text += "\n";
+    }
+    const TriMesh mesh = welded(parse(text));
+    EXPECT_EQ(mesh.positions.size(), 24u);
+    for (const auto& t : mesh.triangles) {
+      const glm::dvec3 face = glm::cross(mesh.positions[t[1]] - mesh.positions[t[0]],
+                                         mesh.positions[t[2]] - mesh.positions[t[0]]);
+      for (const std::uint32_t v : t) {
+        EXPECT_NEAR(glm::dot(glm::normalize(face), glm::dvec3(mesh.normals[v])), 1, 1e-6);
+        EXPECT_LT(mesh.source_position(v), 8u);
+      }
+    }
+  }
+}
+
+TEST(Weld, NoiseIsNoCrease) {
+  // A bumpy sheet: heights of up to 0.7 of the mesh width, as of a rough scan.
+  std::mt19937 random(5);
+  std::string text;
+  for (int i = 0; i < 41 * 41; ++i) {
+    text += "v " + std::to_string(i % 41) + " " + std::to_string(i / 41) + " " +
+            std::to_string(static_cast<double>(random() % 1000) / 1430) + "\n";
+  }
+  for (int i = 0; i < 40 * 40; ++i) {
+    const int a = i / 40 * 41 + i % 40 + 1;
+    text += "f " + std::to_string(a) + " " + std::to_string(a + 1) + " " + std::to_string(a + 42) +
+            "\nf " + std::to_string(a) + " " + std::to_string(a + 42) + " " +
+            std::to_string(a + 41) + "\n";
+  }
+  Report report;
+  EXPECT_EQ(weld(parse(text), report)->positions.size(), 1681u);
+  EXPECT_NE(report.diagnostics.back().message.find("noise"), std::string::npos);
+}
+
+TEST(Weld, TrianglesInBothWindingsAreLitFromBothSides) {
+  for (const char* smoothing : {"", "s 1\n"}) {
+    const std::string square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+    const TriMesh mesh = welded(parse(square + smoothing + "f 1 2 3\nf 1 3 4\nf 3 2 1\nf 4 3 1\n"));
+    EXPECT_EQ(mesh.positions.size(), 8u);
+    for (std::size_t t = 0; t < 4; ++t) {
+      for (const std::uint32_t v : mesh.triangles[t]) {
+        EXPECT_NEAR(mesh.normals[v].z, t < 2 ? 1 : -1, 1e-6) << smoothing << t;
+      }
+    }
+  }
+}
+
+TEST(Weld, LostFacesAreToldOfAndMoreThanHalfAreAnError) {
+  // Of 20 faces as many name a vertex that does not exist.
+  const auto ends = [](int lost) {
+    std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    for (int f = 0; f < 20; ++f) text += f < lost ? "f 1 2 9\n" : "f 1 2 3\n";
+    Report report;
+    const auto mesh = weld(parse(text), report);
+    if (!mesh) return mesh.error().code;
+    const bool told = std::ranges::any_of(report.diagnostics,
+                                          [](const Diagnostic& d) { return d.id == "model.lost"; });
+    return std::string(told ? "told" : "");
+  };
+  EXPECT_EQ(ends(1), "");
+  EXPECT_EQ(ends(2), "told");
+  EXPECT_EQ(ends(10), "told");
+  EXPECT_EQ(ends(11), "model.mostly-lost");
 }
 
 TEST(Weld, DropsWhatCannotBeSeenAndSaysSo) {

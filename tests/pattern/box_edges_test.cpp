@@ -1,4 +1,4 @@
-// Crops of a box's sides, mended by the print that runs over its edges.
+// Crops of a box's sides, repaired by the print that runs over its edges.
 #include <cstdlib>
 
 #include <gtest/gtest.h>
@@ -44,16 +44,16 @@ double beside(const std::array<GrayPicture, 6>& sides) {
 }
 
 TEST(BoxEdges, PrintThatRunsAroundMeetsAgain) {
-  const auto well = mend_crops(wrapped(0));
+  const auto well = correct_crops(wrapped(0));
   EXPECT_EQ(well.most, 0);
   EXPECT_EQ(well.pictures[1].pixels, wrapped(0)[1].pixels) << "nothing is touched";
   const auto cut = wrapped(8);
-  const auto mended = mend_crops(cut);
-  EXPECT_FALSE(mended.beyond);
+  const auto corrected = correct_crops(cut);
+  EXPECT_FALSE(corrected.beyond);
   // 8 of 300 rows between the right side and its neighbours, which share them.
-  EXPECT_GT(mended.most, 0.4 * 8 / 300);
-  EXPECT_LT(mended.most, 0.8 * 8 / 300);
-  EXPECT_LT(beside(mended.pictures), 0.5 * beside(cut));
+  EXPECT_GT(corrected.most, 0.4 * 8 / 300);
+  EXPECT_LT(corrected.most, 0.8 * 8 / 300);
+  EXPECT_LT(beside(corrected.pictures), 0.5 * beside(cut));
 }
 
 TEST(BoxEdges, SidesThatHaveNothingInCommonStay) {
@@ -64,7 +64,7 @@ TEST(BoxEdges, SidesThatHaveNothingInCommonStay) {
       sides[i] = picture_of(test::textured_picture(width, i < 4 ? kHigh : kDeep,
                                                    seed + static_cast<std::uint32_t>(i)));
     }
-    EXPECT_EQ(mend_crops(sides).most, 0) << seed;
+    EXPECT_EQ(correct_crops(sides).most, 0) << seed;
   }
 }
 

@@ -126,7 +126,7 @@ TEST_F(Calibrate, FromAnyPatternThroughABentLens) {
   EXPECT_GE(calibration->views, 7);
   expect_camera(*calibration, bent_camera());
 
-  // What is written is what the player reads.
+  // The player reads the written file.
   ASSERT_TRUE(write_camera_file(*calibration, path("camera.yml")));
   const auto camera = read_camera_file(path("camera.yml"));
   ASSERT_TRUE(camera) << to_line(camera.error());
@@ -193,14 +193,16 @@ TEST_F(Calibrate, SaysWhatIsMissing) {
 }
 
 TEST_F(Calibrate, RealPhotosAsOpenCvHasThem) {
-  const std::string data = test::shared_data();
-  if (data.empty()) GTEST_SKIP() << "there is no shared data";
-  const auto known = read_camera_file(data + "/calib/left_intrinsics.yml");
+  const std::string data = test::opencv_photos();
+  if (data.empty()) GTEST_SKIP() << "opencv-doc is not installed";
+  const auto known = read_camera_file(data + "/left_intrinsics.yml");
   ASSERT_TRUE(known) << to_line(known.error());
   CalibrateOptions options;
-  for (const auto& entry : fs::directory_iterator(data + "/calib")) {
-    if (entry.path().extension() == ".jpg") options.inputs.push_back(entry.path());
+  for (const auto& entry : fs::directory_iterator(data)) {
+    const std::string name = entry.path().filename();
+    if (name.starts_with("left") && name.size() == 10) options.inputs.push_back(entry.path());
   }
+  ASSERT_EQ(options.inputs.size(), 13u);
   options.board_columns = 9;
   options.board_rows = 6;
   const auto calibration = calibrate(options, {});

@@ -89,7 +89,7 @@ TEST(FindCorners, WithinOnePercentOfTheWidth) {
   }
 }
 
-/// Darkens a table beside what lies there, as a soft shadow does.
+/// Darkens a table next to the objects, as a soft shadow does.
 cv::Mat shaded(const cv::Mat& table, const Corners& corners) {
   cv::Mat light(table.size(), CV_32F, cv::Scalar(1));
   std::vector<cv::Point> outline;
@@ -135,6 +135,112 @@ TEST(FindCorners, APartOfALongerThingIsDoubted) {
   EXPECT_NEAR(found->corners[0].x, 150, 5);
   EXPECT_LT(found->corners[1].x, 800);
   EXPECT_TRUE(found->framed);
+}
+
+/// Boards of wood: streaks along them, and gaps between.
+cv::Mat wood() {
+  cv::Mat streaks(720, 960, CV_32F);
+  cv::theRNG().state = 11;
+  cv::randn(streaks, 0, 1);
+  cv::GaussianBlur(streaks, streaks, cv::Size(), 60, 1.5);
+  cv::normalize(streaks, streaks, 0.6, 1.3, cv::NORM_MINMAX);
+  cv::Mat table;
+  cv::cvtColor(streaks, table, cv::COLOR_GRAY2BGR);
+  cv::multiply(table, cv::Scalar(60, 95, 140), table);
+  table.convertTo(table, CV_8UC3);
+  for (int y = 90; y < table.rows; y += 210) {
+    cv::line(table, cv::Point(0, y), cv::Point(table.cols, y), cv::Scalar(25, 40, 60), 2);
+  }
+  return table;
+}
+
+/// As printed: 0 to its edges, 1 with a white margin, 2 with a frame near its edges.
+cv::Mat printed(cv::Mat pattern, int how) {
+  if (how == 1) {
+    cv::copyMakeBorder(pattern, pattern, 40, 40, 40, 40, cv::BORDER_CONSTANT,
+                       cv::Scalar(240, 244, 246));
+  }
+  const cv::Rect frame(22, 22, pattern.cols - 44, pattern.rows - 44);
+  if (how == 2) cv::rectangle(pattern, frame, cv::Scalar(30, 160, 60), 5);
+  return pattern;
+}
+
+double apart(const std::array<PixelPoint, 4>& found, const Corners& corners) {
+  double most = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    most = std::max(most, std::hypot(found[i].x - static_cast<double>(corners[i].x),
+                                     found[i].y - static_cast<double>(corners[i].y)));
+  }
+  return most;
+}
+
+TEST(FindPicture, WrongCornersAreWarnedOfAndRightOnesAreNot) {
+  const std::vector<Corners> views = {
+      {{{250.3f, 150.6f}, {720.2f, 120.4f}, {760.8f, 560.1f}, {220.7f, 520.9f}}},
+      {{{330.5f, 200.2f}, {640.6f, 230.7f}, {600.3f, 610.4f}, {280.8f, 560.2f}}}};
+  int photos = 0;
+  int seen = 0;
+  int right = 0;
+  int alarms = 0;
+  for (const char* pattern : {"mural.png", "game.png", "cover.png", "painting.png"}) {
+    for (const int how : {0, 1, 2}) {
+      for (const int ground : {0, 1, 2}) {
+        const Corners& corners = views[static_cast<std::size_t>(photos) % views.size()];
+        cv::Mat table = ground == 0 ? backdrop("") : ground == 1 ? wood() : backdrop("survey.png");
+        if (photos % 2 == 0) table = shaded(table, corners);
+        ++photos;
+        seen += ground < 2 ? 1 : 0;  // a busy background hides edges, and is warned of
+        const cv::Mat bgr = photograph(printed(asset(pattern), how), table, corners);
+        const Photo photo{as_photo(bgr)};
+        const FoundPicture found = find_picture(photo, find_corners(photo.image));
+        const bool good = found.corners && apart(*found.corners, corners) < 5;
+        const bool warned = *found.doubt != 0;
+        right += good ? 1 : 0;
+        alarms += good && warned ? 1 : 0;
+        EXPECT_TRUE(good || warned) << pattern << " printed " << how << " on " << ground;
+      }
+    }
+  }
+  EXPECT_GE(right, seen * 2 / 3);
+  EXPECT_LE(alarms, photos / 10);
+}
+
+TEST(FindPicture, AFileThatIsThePictureStaysWhole) {
+  for (const char* name :
+       {"cover.png", "game.png", "mural.png", "painting.png", "poems.png", "survey.png"}) {
+    const Photo photo{as_photo(asset(name))};
+    const FoundPicture found = find_picture(photo, find_corners(photo.image));
+    EXPECT_FALSE(found.corners) << name;
+    EXPECT_STREQ(found.doubt, "") << name;
+  }
+}
+
+TEST(FindPicture, ASmallFigureIsAPartOfThePicture) {
+  Photo photo;
+  photo.image = {1000, 1000, {}};
+  for (const double side : {282.0, 284.0}) {  // 7.95 and 8.07 % of the photo
+    FoundCorners found;
+    found.corners = {{{300, 300}, {300 + side, 300}, {300 + side, 300 + side}, {300, 300 + side}}};
+    found.sharpness = found.divided = 1;
+    EXPECT_EQ(find_picture(photo, found).corners.has_value(), side > 283) << side;
+  }
+}
+
+TEST(FindPicture, TwoThingsAreWarnedOf) {
+  const Corners left = {{{100.3f, 150.6f}, {420.2f, 120.4f}, {430.8f, 460.1f}, {90.7f, 420.9f}}};
+  const Corners right = {{{520.3f, 200.6f}, {830.2f, 220.4f}, {800.8f, 560.1f}, {500.7f, 520.9f}}};
+  const Photo photo{as_photo(
+      photograph(asset("mural.png"), photograph(asset("game.png"), backdrop(""), left), right))};
+  EXPECT_STREQ(find_picture(photo, find_corners(photo.image)).doubt, "rivalled");
+}
+
+TEST(FindPicture, APhotoInWhichNothingIsFoundIsWarnedOf) {
+  Photo photo{as_photo(backdrop(""))};  // 4:3, as cameras make them
+  EXPECT_STREQ(find_picture(photo, find_corners(photo.image)).doubt, "not-found");
+  photo.image = as_photo(backdrop("")(cv::Rect(0, 0, 700, 700)));
+  EXPECT_STREQ(find_picture(photo, find_corners(photo.image)).doubt, "");
+  photo.focal_px = 800;  // a camera's, by its EXIF
+  EXPECT_STREQ(find_picture(photo, find_corners(photo.image)).doubt, "not-found");
 }
 
 TEST(FindCorners, NothingThatStandsOutIsAnError) {

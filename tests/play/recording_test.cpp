@@ -1,4 +1,4 @@
-// Recordings: what is written reads back, and a replay that differs is found out.
+// Recordings: written files read back, and a replay that differs is found out.
 #include "runtime/play/recording.hpp"
 
 #include <gtest/gtest.h>

@@ -46,7 +46,7 @@ TEST(Sinks, AMovieHoldsEachFrame) {
   }
   ASSERT_TRUE((*sink)->finish(""));
   sink->reset();
-  EXPECT_EQ(folder.count(), 1u) << "nothing half-made beside it";
+  EXPECT_EQ(folder.count(), 1u) << "nothing half-made next to it";
   const std::string bytes = test::read_text(path);
   EXPECT_NE(bytes.find("avc1"), std::string::npos);
 

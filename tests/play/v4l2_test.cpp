@@ -64,12 +64,12 @@ struct FakeCamera final : VideoDevice {
     return memory[offset];
   }
 
-  Wake::Event wait(const Wake& wake, milliseconds limit) override {
+  WakeEvent::Event wait(const WakeEvent& wake, milliseconds limit) override {
     const bool ready = next < frames || next == unplugged_at;
-    return wake.wait_for_stop(ready ? milliseconds(0) : limit) == Wake::Event::kStopped
-               ? Wake::Event::kStopped
-           : ready ? Wake::Event::kReadable
-                   : Wake::Event::kTimeout;
+    return wake.wait_for_stop(ready ? milliseconds(0) : limit) == WakeEvent::Event::kStopped
+               ? WakeEvent::Event::kStopped
+           : ready ? WakeEvent::Event::kReadable
+                   : WakeEvent::Event::kTimeout;
   }
 
  private:
@@ -110,7 +110,7 @@ struct FakeCamera final : VideoDevice {
 };
 
 Result<std::unique_ptr<FrameSource>> start(std::unique_ptr<FakeCamera> camera) {
-  CameraWish wish;
+  CaptureFormat wish;
   wish.patience = milliseconds(20);
   return start_camera(std::move(camera), "camera", wish);
 }
@@ -166,7 +166,7 @@ TEST(Camera, IsLostWhenUnplugged) {
 TEST(Camera, StopEndsAWaitThatWouldLast) {
   auto camera = std::make_unique<FakeCamera>();
   camera->frames = 0;
-  CameraWish wish;
+  CaptureFormat wish;
   wish.patience = std::chrono::seconds(60);
   auto source = start_camera(std::move(camera), "camera", wish);
   ASSERT_TRUE(source);

@@ -91,7 +91,7 @@ TEST_F(WindowTest, ClicksAreInPixelsOfThePicture) {
   const auto acts = window_->acts(milliseconds(0));
   ASSERT_EQ(acts.size(), 1u) << "the right button means nothing";
   EXPECT_EQ(acts[0].act, Act::kClick);
-  // The picture's middle lies between its pixels 159 and 160, 119 and 120.
+  // The picture's middle is between its pixels 159 and 160, 119 and 120.
   EXPECT_NEAR(acts[0].at.x, 159.5, 1.0);
   EXPECT_NEAR(acts[0].at.y, 119.5, 1.0);
 }

@@ -188,7 +188,7 @@ TEST_F(BackgroundTest, OnlyChangedRowsAreSent) {
                                  after.begin() + static_cast<std::ptrdiff_t>(at));
     EXPECT_EQ(same, y < 5 || y > 8) << "row " << y;
   }
-  // Four rows of luma, and the three rows of pairs that they lie in.
+  // Four rows of luma, and the three rows of pairs that they are in.
   EXPECT_EQ(renderer_->stats().bytes_uploaded, 4u * 32 + 3u * 32);
   made.picture.row_count = 0;
   EXPECT_TRUE(after == show(*renderer_, made.picture));

@@ -1,5 +1,5 @@
 // The benchmark's rows on a small bundle, in a process that has opened no context before.
-#include "bake/lab/render_bench.hpp"
+#include "bake/extensions/lab/render_bench.hpp"
 
 #include <algorithm>
 
@@ -39,7 +39,7 @@ TEST(RenderBench, TellsWhatEachWayCosts) {
   EXPECT_EQ(value(*rows, "model x3 index_vbo draw_calls", false), 3);
   EXPECT_EQ(value(*rows, "model x3 instancing_vbo draw_calls", false), 1);
   EXPECT_EQ(value(*rows, "model x3 instancing_vbo draw_calls", true), 3);
-  // By hand: three copies of vertices of 12 bytes and indices of 2, three a triangle.
+  // On paper: three copies of vertices of 12 bytes and indices of 2, three a triangle.
   const double sent = value(*rows, "model x3 instancing_vbo bytes_per_frame", true);
   EXPECT_GE(sent, 3.0 * kTriangles * 3 * (12 + 2));
   EXPECT_LE(value(*rows, "model x3 instancing_vbo bytes_per_frame", false), sent / 10);

@@ -37,7 +37,7 @@ class CapiTest : public ::testing::Test {
   }
   void TearDown() override { std::remove(path_.c_str()); }
 
-  /// A file with the bundle's bytes behind so many others, and some more.
+  /// A file with the bundle's bytes behind some others, and some more.
   void write_asset(std::size_t offset) const {
     const auto bytes = bundle_->view->bytes();
     std::ofstream file(path_, std::ios::binary);
@@ -86,6 +86,23 @@ TEST_F(CapiTest, RefusesARangeThatTheFileDoesNotHold) {
   auto error = sized<modar_error>();
   EXPECT_EQ(modar_bundle_open_fd(-1, 0, 10, &error), nullptr);
   EXPECT_STREQ(error.code, "io.map");
+}
+
+TEST_F(CapiTest, ReportsAFileThatWasCutShort) {
+  modar_bundle* bundle = modar_bundle_open(bundle_->path.c_str(), nullptr);
+  ASSERT_NE(bundle, nullptr);
+  auto error = sized<modar_error>();
+  EXPECT_EQ(modar_bundle_intact(bundle, &error), MODAR_OK);
+  modar_guard_files();
+  ASSERT_EQ(truncate(bundle_->path.c_str(), 100), 0);
+  EXPECT_EQ(modar_bundle_intact(bundle, &error), MODAR_IO);
+  EXPECT_STREQ(error.code, "io.changed");
+  EXPECT_EQ(modar_bundle_verify(bundle, nullptr), MODAR_IO);
+  EXPECT_EQ(modar_model_count(bundle), 1u) << "tables are kept";
+  modar_context* context = modar_context_create(nullptr);
+  EXPECT_EQ(modar_renderer_create(bundle, nullptr, 0, nullptr), nullptr);
+  modar_context_destroy(context);
+  modar_bundle_close(bundle);
 }
 
 TEST_F(CapiTest, TakesBytesAtAnyMultipleOfFour) {
@@ -157,16 +174,16 @@ TEST_F(CapiTest, RefusesACameraThatCannotBe) {
     auto camera = sized<modar_camera>();
     modar_camera_default(64, 48, &camera);
     camera.fx = focal;
-    EXPECT_EQ(modar_tracker_create(bundle, &camera, &error), nullptr);
+    EXPECT_EQ(modar_tracker_create(bundle, &camera, nullptr, &error), nullptr);
     EXPECT_STREQ(error.code, "camera.matrix") << focal;
   }
   auto camera = sized<modar_camera>();
   modar_camera_default(64, 48, &camera);
   camera.distortion[2] = std::nan("");
-  EXPECT_EQ(modar_tracker_create(bundle, &camera, &error), nullptr);
+  EXPECT_EQ(modar_tracker_create(bundle, &camera, nullptr, &error), nullptr);
   EXPECT_STREQ(error.code, "camera.distortion");
   modar_camera_default(0, 48, &camera);
-  EXPECT_EQ(modar_tracker_create(bundle, &camera, &error), nullptr);
+  EXPECT_EQ(modar_tracker_create(bundle, &camera, nullptr, &error), nullptr);
   EXPECT_STREQ(error.code, "camera.size");
   modar_bundle_close(bundle);
 }
@@ -266,7 +283,7 @@ TEST_F(CapiTest, AnswersNullHandles) {
   float matrix[16];
   const std::uint8_t gray[4] = {};
   const double turn[3] = {};
-  const float light[3] = {};
+  const modar_drawing drawing = {sizeof drawing, &camera, nullptr, &item, 1};
   EXPECT_EQ(modar_model_count(nullptr) + modar_pattern_count(nullptr) + modar_scene_count(nullptr),
             0u);
   EXPECT_EQ(modar_model_name(nullptr, 0, text, sizeof text), 0u);
@@ -277,11 +294,11 @@ TEST_F(CapiTest, AnswersNullHandles) {
   EXPECT_EQ(modar_pattern_picture(nullptr, 0, nullptr, nullptr, nullptr), 0);
   EXPECT_EQ(modar_pattern_width_mm(nullptr, 0), 0.0);
   EXPECT_EQ(modar_scene_at(nullptr, 0, &scene), 0);
-  EXPECT_EQ(modar_tracker_create(nullptr, &camera, &error), nullptr);
+  EXPECT_EQ(modar_tracker_create(nullptr, &camera, nullptr, &error), nullptr);
   modar_tracker_reset(nullptr);
   modar_tracker_turn(nullptr, turn);
   for (const int failed :
-       {modar_bundle_verify(nullptr, &error), modar_tracker_step(nullptr, gray, 2, &error),
+       {modar_bundle_verify(nullptr, &error), modar_tracker_step(nullptr, gray, 2, 0, &error),
         modar_gray(nullptr, nullptr, &error), modar_renderer_restore(nullptr, &error),
         modar_renderer_resize(nullptr, 8, 8, &error)}) {
     EXPECT_EQ(failed, MODAR_USAGE);
@@ -289,23 +306,25 @@ TEST_F(CapiTest, AnswersNullHandles) {
   }
   EXPECT_EQ(modar_tracker_pose(nullptr, 0, &pose), 0);
   EXPECT_EQ(modar_tracker_camera(nullptr, &camera), 0.0);
-  EXPECT_NE(modar_tracker_reason(nullptr), nullptr);
+  EXPECT_EQ(modar_tracker_reason(nullptr), -1);
+  EXPECT_STREQ(modar_reason_text(-1), "unknown");
+  EXPECT_STREQ(modar_reason_text(MODAR_REASON_CURVED), "curved");
+  EXPECT_STREQ(modar_reason_text(MODAR_REASON_CURVED + 1), "unknown");
   modar_camera_default(8, 8, nullptr);
   modar_projection(nullptr, 1, 2, matrix);
   modar_view(nullptr, matrix);
   modar_item_place(nullptr, &scene, &pose);
   modar_item_place(&item, nullptr, &pose);
-  modar_renderer_render(nullptr, &picture, &camera, nullptr, &item, 1);
-  modar_renderer_draw(nullptr, &surface, &picture, &camera, nullptr, &item, 1);
-  modar_renderer_observe(nullptr, &picture, &camera, &item, 1);
-  modar_renderer_set_light(nullptr, light, 0);
+  modar_renderer_render(nullptr, &picture, &drawing);
+  modar_renderer_draw(nullptr, &surface, &picture, &drawing);
+  modar_renderer_observe(nullptr, &picture, &drawing);
   modar_renderer_set_options(nullptr, nullptr);
   modar_render_options_default(nullptr);
   modar_renderer_show(nullptr, 8, 8);
   modar_renderer_read_rgba(nullptr, nullptr);
   modar_renderer_stats(nullptr, &stats);
   EXPECT_EQ(modar_renderer_gpu_bytes(nullptr), 0u);
-  EXPECT_EQ(modar_pick(nullptr, &camera, 0, 0, &item, 1, &hit), 0);
+  EXPECT_EQ(modar_pick(nullptr, &drawing, 0, 0, &hit), 0);
   modar_surface_to_frame(nullptr, &camera, 0, 0, nullptr, nullptr);
 }
 
@@ -347,7 +366,7 @@ TEST(CapiTexts, AreHandedOutByLanguage) {
   content.meta =
       R"({"tool":"test","texts":[{"text":{"el":"Βάζο","en":"A \"red\" vase,\u00e9\ud83c\udffa"},"pattern":")" +
       name + R"("},{"pattern":"other","text":{"de":"Nichts"}},{"pattern":")" + name +
-      R"(","model":"m","text":{"en":"from Athens."},"alt":{"en":"A vase stands there."}}]})";
+      R"(","model":"m","text":{"en":"from Athens."},"alt":{"en":"A vase from Athens."}}]})";
   const auto bytes = test::encode(content);
   modar_bundle* bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), nullptr);
   ASSERT_NE(bundle, nullptr);
@@ -358,7 +377,7 @@ TEST(CapiTexts, AreHandedOutByLanguage) {
   EXPECT_EQ(languages, "el en de ");
   EXPECT_EQ(modar_pattern_text(bundle, 0, MODAR_TEXT, "en", text, sizeof text), 32u);
   EXPECT_STREQ(text, "A \"red\" vase,\xC3\xA9\xF0\x9F\x8F\xBA from Athens.");
-  EXPECT_EQ(modar_pattern_text(bundle, 0, MODAR_ALT_TEXT, "en", text, 8), 20u);
+  EXPECT_EQ(modar_pattern_text(bundle, 0, MODAR_ALT_TEXT, "en", text, 8), 19u);
   EXPECT_STREQ(text, "A vase ");
   EXPECT_EQ(modar_pattern_text(bundle, 0, MODAR_TEXT, "el", text, sizeof text), 8u);
   EXPECT_EQ(modar_pattern_text(bundle, 0, MODAR_TEXT, "de", text, sizeof text), 0u);
@@ -398,8 +417,12 @@ TEST(CapiOrbit, GoesAroundWhatStandsOnAPattern) {
   camera.width = 300;
   camera.height = 200;
   auto pose = sized<modar_pose>();
-  EXPECT_EQ(modar_orbit(bundle, 1, 0, 0, 1, &camera, &pose), 0);
-  EXPECT_EQ(modar_orbit(bundle, 0, 0, 0, 0, &camera, &pose), 0);
+  const auto orbit = [&](std::uint32_t pattern, double turn, double tilt, double zoom) {
+    const modar_turntable from{sizeof from, turn, tilt, zoom};
+    return modar_orbit(bundle, pattern, &from, &camera, &pose);
+  };
+  EXPECT_EQ(orbit(1, 0, 0, 1), 0);
+  EXPECT_EQ(orbit(0, 0, 0, 0), 0);
   // Where a point of the pattern's space is seen.
   const auto pixel = [&](double x, double y, double z) {
     const double at[3] = {x, y, z};
@@ -415,7 +438,7 @@ TEST(CapiOrbit, GoesAroundWhatStandsOnAPattern) {
   };
   for (const double turn : {0.0, 1.0, 3.0, -2.0}) {
     for (const double tilt : {0.1, 0.7, 1.5}) {
-      ASSERT_EQ(modar_orbit(bundle, 0, turn, tilt, 1, &camera, &pose), 1);
+      ASSERT_EQ(orbit(0, turn, tilt, 1), 1);
       EXPECT_NEAR(glm::distance(pixel(0.25, 0, 0.5), {149.5, 99.5}), 0, 0.1) << turn << " " << tilt;
       const glm::dvec2 tip = pixel(0.25, 0, 1);
       EXPECT_LT(tip.y, 99.5) << "up is up";
@@ -426,19 +449,19 @@ TEST(CapiOrbit, GoesAroundWhatStandsOnAPattern) {
     }
   }
   // From the pattern's lower edge, its right is on the right; half around, on the left.
-  modar_orbit(bundle, 0, 0, 0.1, 1, &camera, &pose);
+  orbit(0, 0, 0.1, 1);
   const double wide = pixel(0.75, 0, 0.5).x - pixel(-0.25, 0, 0.5).x;
   EXPECT_GT(wide, 80);
-  modar_orbit(bundle, 0, 0, 0.1, 2, &camera, &pose);
+  orbit(0, 0, 0.1, 2);
   EXPECT_GT(pixel(0.75, 0, 0.5).x - pixel(-0.25, 0, 0.5).x, 1.9 * wide);
-  modar_orbit(bundle, 0, 3.14159265, 0.1, 1, &camera, &pose);
+  orbit(0, 3.14159265, 0.1, 1);
   EXPECT_NEAR(pixel(0.75, 0, 0.5).x - pixel(-0.25, 0, 0.5).x, -wide, 0.1);
   modar_bundle_close(bundle);
 }
 
 TEST(CapiBounds, EnclosePicturesAndLabels) {
   modar::BundleContent content = test::acting_content();
-  content.nodes[1].half_size[0] = 50;  // along y and z, as it is turned
+  content.nodes[1].half_size[0] = 50;  // along y and z, as turned
   content.nodes[1].half_size[1] = 25;
   content.nodes[1].place[2] = 40;
   content.nodes[2].place[0] = -75;
@@ -457,7 +480,9 @@ TEST(CapiBounds, EnclosePicturesAndLabels) {
 }
 
 TEST(CapiActions, RunABundlesNodes) {
-  const auto bytes = test::encode(test::acting_content());
+  modar::BundleContent content = test::acting_content();
+  content.scenes.pop_back();  // of a model that no node shows
+  const auto bytes = test::encode(content);
   modar_bundle* bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), nullptr);
   ASSERT_NE(bundle, nullptr);
   ASSERT_EQ(modar_node_count(bundle), 5u);
@@ -538,7 +563,8 @@ TEST(CapiActions, RunABundlesNodes) {
   auto camera = sized<modar_camera>();
   modar_camera_default(64, 64, &camera);
   auto label = sized<modar_label>();
-  ASSERT_EQ(modar_label_project(actions, 2, &camera, view, nullptr, 0, &label), 1);
+  modar_drawing drawing{sizeof drawing, &camera, nullptr, nullptr, 0};
+  ASSERT_EQ(modar_label_project(actions, 2, &drawing, view, &label), 1);
   // 64 pixels of focal length, 0.75 to the left of the middle, four away.
   EXPECT_FLOAT_EQ(label.x, 31.5f - 64 * 0.75f / 4);
   EXPECT_FLOAT_EQ(label.y, 31.5f);
@@ -547,12 +573,15 @@ TEST(CapiActions, RunABundlesNodes) {
   before.node = 2;
   for (const int i : {0, 5, 10, 15}) before.to_eye[i] = 1;
   before.to_eye[14] = -2;
-  ASSERT_EQ(modar_label_project(actions, 2, &camera, view, &before, 1, &label), 1);
+  drawing.items = &before;
+  drawing.item_count = 1;
+  ASSERT_EQ(modar_label_project(actions, 2, &drawing, view, &label), 1);
   EXPECT_EQ(label.covered, 1);
   before.to_eye[14] = -5;
-  ASSERT_EQ(modar_label_project(actions, 2, &camera, view, &before, 1, &label), 1);
+  ASSERT_EQ(modar_label_project(actions, 2, &drawing, view, &label), 1);
   EXPECT_EQ(label.covered, 0);
-  EXPECT_EQ(modar_label_project(actions, 0, &camera, view, nullptr, 0, &label), 0);
+  drawing.item_count = 0;
+  EXPECT_EQ(modar_label_project(actions, 0, &drawing, view, &label), 0);
   modar_actions_reset(actions);
   EXPECT_EQ(modar_actions_shown(actions, 1), 0);
   modar_actions_destroy(actions);
@@ -589,7 +618,8 @@ class CapiDrawTest : public GlTest {
   std::vector<std::uint8_t> drawn(const modar_picture* picture,
                                   const std::vector<modar_item>& items = {}) {
     std::vector<std::uint8_t> rgba(std::size_t{4} * kWide * kHigh);
-    modar_renderer_render(renderer_, picture, &camera_, nullptr, items.data(), items.size());
+    const modar_drawing drawing{sizeof drawing, &camera_, nullptr, items.data(), items.size()};
+    modar_renderer_render(renderer_, picture, &drawing);
     modar_renderer_read_rgba(renderer_, rgba.data());
     return rgba;
   }
@@ -703,12 +733,13 @@ TEST_F(CapiDrawTest, StridesOverItemsOfAnotherVersion) {
   Longer<modar_item> longer[2] = {{away, {}}, {item, {}}};
   for (Longer<modar_item>& each : longer) each.known.size = sizeof each;
   std::vector<std::uint8_t> rgba(expected.size());
-  modar_renderer_render(renderer_, nullptr, &camera_, nullptr, &longer[0].known, 2);
+  const modar_drawing drawing{sizeof drawing, &camera_, nullptr, &longer[0].known, 2};
+  modar_renderer_render(renderer_, nullptr, &drawing);
   modar_renderer_read_rgba(renderer_, rgba.data());
   EXPECT_EQ(farthest(rgba, expected), 0);
   EXPECT_GT(*std::max_element(rgba.begin(), rgba.end() - 1), 0);
   longer[0].known.size = 0;  // forgotten
-  modar_renderer_render(renderer_, nullptr, &camera_, nullptr, &longer[0].known, 2);
+  modar_renderer_render(renderer_, nullptr, &drawing);
   auto stats = sized<modar_render_stats>();
   modar_renderer_stats(renderer_, &stats);
   EXPECT_EQ(stats.draw_calls, 0);

@@ -44,7 +44,7 @@ void add_pattern_and_scene(BundleContent& content) {
 TEST_F(ContactTest, OcclusionDimsTheLightFromAllAround) {
   SceneMaker maker;
   maker.add_plain_model(Layout::kHalfLit, square(1.0, {200, 200, 200}));
-  // Behind the three bytes of the normal: 0 and 127 stand for nothing and all; ES 2 reads 63 as
+  // Behind the three bytes of the normal: 0 and 127 represent nothing and all; ES 2 reads 63 as
   // 127 / 255.
   const std::vector<std::pair<int, double>> stored = {
       {127, 1.0}, {63, 127.0 / 255}, {31, 63.0 / 255}};
@@ -100,7 +100,7 @@ TEST_F(ContactTest, AShadowDarkensThePictureInItsRectangle) {
   EXPECT_EQ(red(pixels, 4, 16), 200);
   EXPECT_NEAR(red(pixels, 9, 9), 200 * std::sqrt(64.0 / 255), 2);
   EXPECT_NEAR(red(pixels, 23, 22), 200, 2);
-  EXPECT_EQ(red(pixels, 16, 16), 10) << "the model stands on its shadow";
+  EXPECT_EQ(red(pixels, 16, 16), 10) << "the model is on its shadow";
   // An item of no scene has none.
   const DrawItem alone{0, from_above()};
   EXPECT_EQ(red(draw(*renderer, camera_above(kSide), {&alone, 1}, background), 9, 9), 200);
@@ -172,7 +172,7 @@ TEST_F(ContactTest, LightFollowsWhatTheCameraShowsOfThePattern) {
   renderer->set_options(options);
   EXPECT_NEAR(red(draw(*renderer, camera_above(kSide), {&item, 1}, background), 16, 16),
               shade(0.36), 4);
-  // Without a picture, what was seen last holds.
+  // Without a picture, the last one counts.
   EXPECT_NEAR(red(draw(*renderer, camera_above(kSide), {&item, 1}), 16, 16), shade(0.36), 4);
   // An app that draws the picture itself shows a copy of a quarter of its size.
   const std::unique_ptr<Renderer> other = make_renderer(*bundle.view, probe_gl_caps());

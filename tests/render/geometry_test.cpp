@@ -138,10 +138,10 @@ TEST(VertexFormatTest, PositionsReadTheirPadding) {
   };
   EXPECT_EQ(components(kHalf, kNone), 4);
   EXPECT_EQ(components(kHalf, 11), 4);
-  EXPECT_EQ(components(kHalf, 7), 3) << "occlusion lies there";
+  EXPECT_EQ(components(kHalf, 7), 3) << "occlusion is there";
   EXPECT_EQ(components(0, kNone), 3) << "floats are written";
   layout.attributes[1].offset = 6;
-  EXPECT_EQ(components(kHalf, kNone), 3) << "the normal lies there";
+  EXPECT_EQ(components(kHalf, kNone), 3) << "the normal is there";
   layout.attributes[1].offset = 0;
   layout.attributes[0].offset = 6;
   EXPECT_EQ(components(kHalf, kNone), 3) << "the vertex ends there";
@@ -210,7 +210,7 @@ std::uint8_t lit_channel(std::uint8_t colour, double light) {
   return static_cast<std::uint8_t>(std::lround(std::min(255.0, colour * factor)));
 }
 
-/// A material beside the colour of its vertices.
+/// A material next to the colour of its vertices.
 struct Finish {
   double colour = 1;  ///< as stored
   double shininess = 0;
@@ -221,7 +221,7 @@ struct Finish {
 double seen_along(const RoomLight& light, const glm::dvec3& towards, double shininess, int c);
 
 /// White of that finish: what it scatters, and what it mirrors by Schlick's approximation of
-/// Fresnel's equations, weakened at the edges as it is rough.
+/// Fresnel's equations, weakened at the edges by its roughness.
 std::uint8_t mirroring_channel(const Finish& finish, const RoomLight& light, const glm::dvec3& n,
                                const glm::dvec3& ray, std::size_t c) {
   const auto factor = [](double x) { return 1.05 * std::sqrt(x) - 0.05 * x; };
@@ -307,8 +307,7 @@ TEST_F(GeometryTest, NormalsAreLitAsLambertSays) {
     options.light->direction = {0.3f, 0.2f, 0.9f};
     options.light->sky = room_of_all_terms();
     renderer->set_options(options);
-    // Normals must not follow the stretch of positions; light comes another way where there is
-    // none.
+    // Normals must not follow the stretch of positions; light comes another way where none is.
     for (const glm::dvec3& stretch :
          {glm::dvec3(1, 1, 2.5), glm::dvec3(0.9), glm::dvec3(-1, 1, 1)}) {
       expect_lit(*renderer, triangles, *options.light, stretch, layout == Layout::kHalfLit ? 3 : 5);
@@ -329,7 +328,7 @@ double seen_along(const RoomLight& light, const glm::dvec3& towards, double shin
       const double side = std::sqrt(1 - z * z);
       const double x = side * std::cos(turn);
       const double y = side * std::sin(turn);
-      // A cosine lobe keeps 2/3 of what is linear in the direction and 1/4 of what is quadratic.
+      // A cosine lobe keeps 2/3 of the part linear in the direction and 1/4 of the quadratic part.
       const double terms[9] = {1,
                                1.5 * y,
                                1.5 * z,

@@ -188,7 +188,7 @@ TEST(LightEstimate, NothingIsKnownOfWhatIsNotSeen) {
   EXPECT_FALSE(shown.look(shown.rgb()).known) << "white";
   shown.paint([](double, double) { return glm::dvec3(0.5); });
   shown.world_ = glm::translate(glm::mat4(1.0f), glm::vec3(1.9f, 0, 0)) * shown.world_;
-  EXPECT_FALSE(shown.look(shown.rgb()).known) << "beside the frame";
+  EXPECT_FALSE(shown.look(shown.rgb()).known) << "next to the frame";
   shown.world_ = glm::mat4(0.0f);
   EXPECT_FALSE(shown.look(shown.rgb()).known) << "no pose";
 }

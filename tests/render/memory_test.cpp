@@ -87,7 +87,7 @@ BundleContent tile_row(int count, int n) {
   return maker.content;
 }
 
-/// The camera stands before tile `x` of [-1,1], close enough to see a few.
+/// The camera is in front of tile `x` of [-1,1], close enough to see a few.
 DrawItem before(double x) {
   return {0, glm::translate(glm::mat4(1.0f), glm::vec3(static_cast<float>(-x), 0.0f, -0.4f))};
 }
@@ -133,7 +133,7 @@ TEST_F(MemoryTest, TooSmallABudgetFallsBackToCoarseLevels) {
   const BundleContent content = tile_row(10, 12);
   const MappedBundle bundle(content);
   GlCaps caps = probe_gl_caps();
-  // One fine chunk, and coarse ones beside it.
+  // One fine chunk, and coarse ones next to it.
   caps.gpu_memory = 30000;
   const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, caps);
   ASSERT_TRUE(renderer);

@@ -1,4 +1,4 @@
-// Pictures that stand on a pattern: their texels as they are, hidden and hiding as what they are.
+// Pictures that are on a pattern: their texels unchanged, hidden and hiding.
 #include <GLES2/gl2.h>
 #include <glm/gtc/matrix_transform.hpp>
 
@@ -160,7 +160,7 @@ GLuint two_texels(const Rgb& left, const Rgb& right) {
 TEST_F(PlaneTest, AVideoShowsItsPosterThenTheAppsTexture) {
   struct {
     VideoAlpha alpha;
-    Rgb left;   ///< what is seen of the texture's left texel at the left, over black
+    Rgb left;   ///< the visible part of the texture's left texel at the left, over black
     Rgb right;  ///< the same at the right
   } const kCases[] = {{VideoAlpha::kOpaque, {200, 100, 50}, {10, 128, 20}},
                       {VideoAlpha::kBeside, {100, 50, 25}, {100, 50, 25}},

@@ -71,7 +71,7 @@ std::vector<EyeTriangle> to_eye_space(std::span<const Triangle> triangles, const
 }
 
 std::vector<Hit> cast_rays(const Camera& camera, std::span<const EyeTriangle> triangles) {
-  // Rasterisers snap corners to a fraction of a pixel: what is this close to an edge is left open.
+  // Rasterisers snap corners to a fraction of a pixel: pixels this close to an edge are left open.
   constexpr double kMargin = 0.04;
   std::vector<Hit> hits;
   for (int y = 0; y < camera.height; ++y) {

@@ -17,7 +17,7 @@ void put(std::vector<std::byte>& bytes, T value) {
   std::memcpy(bytes.data() + at, &value, sizeof value);
 }
 
-/// Exact for the values of on_half_grid(): sign, exponent and mantissa by hand.
+/// Exact for the values of on_half_grid(): sign, exponent and mantissa computed here.
 std::uint16_t half_bits(double value) {
   if (value == 0.0) return 0;
   int exponent = 0;

@@ -83,7 +83,7 @@ struct MappedBundle {
 
 /// A material whose colour is what its vertices or texture say, whatever the light.
 MaterialRecord flat_material();
-/// Light that leaves flat_material() colours as they are.
+/// Light that leaves flat_material() colours unchanged.
 RenderOptions flat_light();
 
 /// Adds a pattern of 2 x 2 units, without features.

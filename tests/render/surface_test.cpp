@@ -99,7 +99,7 @@ struct Pixel {
   int y = 0;
 };
 
-/// Where a pixel of the frame comes to lie once it is turned, by hand: no matrix of the renderer's.
+/// Where a pixel of the frame is after the turn, computed here: no matrix of the renderer's.
 Pixel turned(Pixel frame, int rotation, bool mirror) {
   Pixel p = frame;
   if (rotation == 90) p = {kHeight - 1 - frame.y, frame.x};
@@ -259,7 +259,7 @@ TEST_F(SurfaceTest, AlphaIsTheCoverageOfTheModels) {
     if (!hits_[i].certain) continue;
     const std::size_t row = i / kWidth + kSurface - kHeight;
     const std::uint8_t* pixel = &pixels[(row * kSurface + i % kWidth) * 4];
-    // Half of it, premultiplied; nothing beside the model.
+    // Half of it, premultiplied; nothing next to the model.
     const bool model = hits_[i].triangle >= 0;
     EXPECT_NEAR(pixel[3], model ? 128 : 0, 1);
     EXPECT_NEAR(pixel[0], model ? expected(i, false)[0] / 2 : 0, 2);
@@ -288,7 +288,7 @@ TEST_F(SurfaceTest, TwoBundlesShareOneFrameAndItsDepth) {
     changed += !same;
   }
   EXPECT_EQ(lost, 0);
-  EXPECT_GT(changed, 0) << "the second bundle's model shows beside the first's";
+  EXPECT_GT(changed, 0) << "the second bundle's model shows next to the first's";
 }
 
 bool is_es3() {
@@ -432,7 +432,7 @@ TEST_F(SurfaceTest, TheAppsStateIsAsItWas) {
   expect_unchanged("render", [&] { another->render(frame(true), projection, items); });
   expect_unchanged("read", [&] { another->read_pixels(pixels); });
   expect_unchanged("blit", [&] { another->blit_to_window(kSurface, kSurface); });
-  // What was read is the picture, whatever the app had set.
+  // The read pixels are the picture, whatever the app had set.
   int wrong = 0;
   for (std::size_t i = 0; i < hits_.size(); ++i) {
     wrong += hits_[i].certain && std::abs(pixels[4 * i] - expected(i, true)[0]) > 2;
@@ -502,8 +502,8 @@ TEST_F(SurfaceTest, SamplesSmoothEdges) {
   EXPECT_EQ(difference_from_fine(*other, 4), stairs);
 }
 
-/// Mesa's software driver has no GL_EXT_multisampled_render_to_texture: what such a driver is
-/// asked, over calls of one sample.
+/// Mesa's software driver has no GL_EXT_multisampled_render_to_texture: the queries to such a
+/// driver, over calls of one sample.
 int asked_of_texture = 0;
 int asked_of_depth = 0;
 
@@ -555,7 +555,7 @@ TEST_F(SurfaceTest, NoPictureNeverStretches) {
   for (std::size_t i = 0; i < hits_.size(); ++i) {
     if (!hits_[i].certain) continue;
     const int red = hits_[i].triangle < 0 ? 0 : expected(i, false)[0];
-    // The frame's rows lie in the middle.
+    // The frame's rows are in the middle.
     wrong += std::abs(pixels[4 * (i + std::size_t{kWidth} * kHeight / 2)] - red) > 1;
   }
   EXPECT_EQ(wrong, 0);

@@ -335,7 +335,7 @@ TEST_F(TextureTest, DrawsSortedByTextureBindEachOnce) {
   draw(*renderer, view.camera, {&view.item, 1});
   EXPECT_EQ(renderer->stats().chunks_drawn, 8);
   EXPECT_EQ(renderer->stats().triangles, 16u);
-  // The second frame finds program, buffers and attributes as the first one left them: what is left
+  // The second frame finds program, buffers and attributes as the first one left them: the rest
   // to do is to bind the two textures.
   EXPECT_LE(renderer->stats().state_changes, 2);
 }

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <random>
 
-#include "bake/web/packed_bundle.hpp"
+#include "bake/extensions/web/packed_bundle.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/tracker_record.hpp"
 #include "formats/transport/coded_bytes.hpp"
@@ -122,7 +122,7 @@ TEST(CodedPicture, ComesBackWhileItComes) {
   for (const GrayPicture& picture : {discs(200, 150), noise, flat}) {
     const auto width = static_cast<std::uint32_t>(picture.width);
     const Bytes coded = encode_picture(picture.pixels, width);
-    Bytes memory(coded.size(), std::byte{0xA5});  // what is not there must not be looked at
+    Bytes memory(coded.size(), std::byte{0xA5});  // missing bytes must not be read
     PictureDecoder decoder(memory, width, static_cast<std::uint32_t>(picture.height));
     for (std::size_t there = 0; there < coded.size(); there += 1 + random() % (coded.size() / 7)) {
       std::copy_n(coded.begin(), there, memory.begin());
@@ -184,11 +184,11 @@ TEST(PackedRecord, DamageIsRefusedOrMakesOtherBytes) {
   }
 }
 
-/// All of the format, with a record, stand-ins and a texture whose finest level is above
+/// All of the format, with a record, proxies and a texture whose finest level is above
 /// kShownSide.
 Bytes staged_bundle() {
   BundleContent content = test::lit_content();
-  test::add_stand_ins(content);
+  test::add_proxies(content);
   ExtraSection record;
   record.type = static_cast<std::uint32_t>(SectionType::kTrackerRecord);
   record.owner = 0;
@@ -209,7 +209,7 @@ TEST(Stages, CoverEverySectionOnceInTheOrderOfNeed) {
     ASSERT_LE(range.offset + range.size, bytes.size());
     for (std::uint64_t i = 0; i < range.size; ++i) ++covered[range.offset + i];
   }
-  EXPECT_EQ(last, LoadStage::kRefine) << "chunks that a stand-in is drawn for";
+  EXPECT_EQ(last, LoadStage::kRefine) << "chunks that a proxy is drawn for";
   for (const SectionEntry& entry : bundle->sections()) {
     for (std::uint64_t i = 0; i < entry.size; ++i) {
       ASSERT_EQ(covered[entry.offset + i], 1) << entry.type << " byte " << i;
@@ -276,11 +276,11 @@ TEST(Arriving, WhatIsShownFirstIsThere) {
                       some->bytes().begin() + static_cast<std::ptrdiff_t>(from));
   };
   const auto indices = static_cast<std::uint64_t>(whole.indices().data() - bytes.data());
-  ASSERT_GT(whole.stand_ins().size(), 0u);
+  ASSERT_GT(whole.proxies().size(), 0u);
   for (std::uint32_t m = 0; m < bundle->models().size(); ++m) {
     std::uint32_t group = m;  // the coarsest that the bundle has
-    for (std::uint32_t i = 0; i < bundle->stand_ins().size(); ++i) {
-      if (bundle->stand_ins()[i].model == m) group = bundle->models().size() + i;
+    for (std::uint32_t i = 0; i < bundle->proxies().size(); ++i) {
+      if (bundle->proxies()[i].model == m) group = bundle->models().size() + i;
     }
     const ChunkGroup chunks = bundle->chunk_group(group);
     const ChunkRecord& chunk = bundle->chunks()[chunks.first_chunk];
@@ -322,9 +322,9 @@ TEST(Arriving, OfWhatPassesByIsKeptWhatIsRead) {
                            bytes.begin() + static_cast<std::ptrdiff_t>(range.offset + range.size),
                            bundle->bytes().begin() + static_cast<std::ptrdiff_t>(range.offset)));
   }
-  EXPECT_GT(bundle->kept().size(), 1u) << "stand-ins and small levels of textures";
+  EXPECT_GT(bundle->kept().size(), 1u) << "proxies and small levels of textures";
   EXPECT_NE(copy(*bundle), bytes);
-  // Whoever reads triangles finds those of stand-ins, and only meanwhile.
+  // Whoever reads triangles finds those of proxies, and only meanwhile.
   const auto first_chunk = [&] {
     return BundleView::open(bundle->bytes()).value().models()[0].first_chunk;
   };
@@ -337,7 +337,7 @@ TEST(Arriving, OfWhatPassesByIsKeptWhatIsRead) {
     return model;
   };
   EXPECT_EQ(record().first_chunk, before);
-  const std::uint32_t meanwhile = bundle->with_stand_ins([&] { return record().first_chunk; });
+  const std::uint32_t meanwhile = bundle->with_proxies([&] { return record().first_chunk; });
   EXPECT_GE(meanwhile, whole.chunks().own().size());
   EXPECT_EQ(record().first_chunk, before);
   // Bytes that are wrong or missing.

@@ -1,6 +1,7 @@
-// An app that brings the bytes itself: through a source that breaks, lies and ends.
+// An app that downloads the bytes itself: through a source that breaks, deceives and ends.
 #include <gtest/gtest.h>
 
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -25,7 +26,7 @@ class ByteSourceTest : public ::testing::Test {
  protected:
   void SetUp() override { publish_as_golden(test::golden_content()); }
 
-  void publish_as_golden(const BundleContent& content) {
+  void publish_as_golden(const BundleContent& content, std::int64_t expires = kExpires) {
     std::string name = (fs::temp_directory_path() / "modar-source-XXXXXX").string();
     ASSERT_NE(::mkdtemp(name.data()), nullptr);
     folder_ = name;
@@ -37,7 +38,7 @@ class ByteSourceTest : public ::testing::Test {
     PublishRequest request;
     request.bundles = {(folder_ / "golden.modar").string()};
     request.folder = (folder_ / "site").string();
-    request.expires = kExpires;
+    request.expires = expires;
     const auto key = make_key();
     ASSERT_TRUE(key);
     Report report;
@@ -56,7 +57,8 @@ class ByteSourceTest : public ::testing::Test {
     return fail(ExitCode{13}, "fetch.missing", path, "no such file", "");
   }
 
-  static constexpr std::int64_t kExpires = 4102444800;  ///< 2100-01-01
+  // The year 2100.
+  static constexpr std::int64_t kExpires = 4102444800;
 
   fs::path folder_;
   FetchOptions options_;
@@ -99,12 +101,12 @@ TEST_F(ByteSourceTest, InstallsThroughALineThatBreaks) {
   EXPECT_FALSE(fetch_release(options_)->changed);
 }
 
-class FirstSightTest : public ByteSourceTest {
+class PreviewTest : public ByteSourceTest {
  protected:
   void SetUp() override { publish_as_golden(test::acting_content()); }  // media come last
 };
 
-TEST_F(FirstSightTest, IsThereWhenTheLineIsCutBeforeTheRest) {
+TEST_F(PreviewTest, IsThereWhenTheLineIsCutBeforeTheRest) {
   std::vector<std::string> shown;
   bool cut = true;
   options_.first = [&shown](const std::string& path) { shown.push_back(path); };
@@ -116,7 +118,7 @@ TEST_F(FirstSightTest, IsThereWhenTheLineIsCutBeforeTheRest) {
   };
   ASSERT_FALSE(fetch_release(options_));
   ASSERT_EQ(shown, std::vector<std::string>{options_.store + "/pieces/golden.first"});
-  EXPECT_EQ(first_sights(options_.store), shown);
+  EXPECT_EQ(previews(options_.store), shown);
   EXPECT_FALSE(installed_release(options_.store));
   const auto mapped = MappedFile::open(shown[0]);
   ASSERT_TRUE(mapped);
@@ -131,7 +133,7 @@ TEST_F(FirstSightTest, IsThereWhenTheLineIsCutBeforeTheRest) {
   ASSERT_TRUE(report) << to_line(report.error());
   EXPECT_EQ(shown.size(), 1u) << "once more, by another fetch";
   EXPECT_EQ(read(report->bundles.at(0)), read(folder_ / "golden.modar"));
-  EXPECT_TRUE(first_sights(options_.store).empty());
+  EXPECT_TRUE(previews(options_.store).empty());
   EXPECT_TRUE(fs::is_empty(folder_ / "store" / "pieces"));
 }
 
@@ -146,6 +148,23 @@ TEST_F(ByteSourceTest, ExpiresByTheAppsClock) {
   ASSERT_FALSE(late);
   EXPECT_EQ(late.error().code, "fetch.expired");
   options_.now = kExpires - 1;
+  EXPECT_TRUE(fetch_release(options_));
+}
+
+TEST_F(ByteSourceTest, KnowsThatItIsNotBeforeItsOwnLastCommit) {
+  options_.source = [&](const std::string& path, std::uint64_t from,
+                        const auto& take) -> Result<void> {
+    MODAR_ASSIGN(const std::string text, file(path));
+    return hand_over(std::string_view(text).substr(from), 4096, take);
+  };
+  options_.now = 1;  // a device without a battery
+  constexpr std::int64_t kAugust2026 = 1785542400;
+  publish_as_golden(test::golden_content(), kAugust2026);
+  const auto report = fetch_release(options_);
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code, "fetch.expired");
+  // No later than today.
+  publish_as_golden(test::golden_content(), std::int64_t{std::time(nullptr)});
   EXPECT_TRUE(fetch_release(options_));
 }
 

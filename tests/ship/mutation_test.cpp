@@ -71,7 +71,7 @@ TEST(Mutations, Documents) {
   const std::string text = release_text(release);
   const auto key = make_key();
   const std::string signature = sign(*key, text, "modar release 3");
-  const std::string link = key_link_text({1, public_key_line(key->public_key)});
+  const std::string link = key_rotation_text({1, public_key_line(key->public_key)});
   std::mt19937 random(1);
   for (int i = rounds(2); i-- > 0;) {
     const std::string document = mutated(text, random);
@@ -83,7 +83,7 @@ TEST(Mutations, Documents) {
         parsed && document != text) {
       EXPECT_FALSE(verify_signature(document, *parsed, key->public_key));
     }
-    (void)parse_key_link(mutated(link, random));
+    (void)parse_key_rotation(mutated(link, random));
     (void)parse_public_key(mutated(public_key_text(key->public_key), random));
   }
 }

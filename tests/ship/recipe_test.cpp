@@ -1,4 +1,4 @@
-// Recipes of the golden bundle: complete, put together by hand, and broken in every byte.
+// Recipes of the golden bundle: complete, assembled here, and broken in every byte.
 #include "formats/transport/recipe.hpp"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ TEST(Recipe, PiecesMakeTheBundle) {
     const bool mesh = piece.form == static_cast<std::uint8_t>(PieceForm::kMesh);
     const std::size_t second = mesh ? piece.second_size : 0;
     std::memcpy(built.data() + piece.offset, raw->data(), raw->size() - second);
-    ASSERT_NE(piece.form, static_cast<std::uint8_t>(PieceForm::kLevel)) << "tiny: cheaper as it is";
+    ASSERT_NE(piece.form, static_cast<std::uint8_t>(PieceForm::kLevel)) << "tiny: cheaper raw";
     for (std::size_t i = 0; i < second; i += 2) {
       std::uint16_t index = 0;
       std::memcpy(&index, raw->data() + raw->size() - second + i, 2);

@@ -16,7 +16,7 @@ import unittest
 import zipfile
 
 from studio import Studio, StudioTest
-from programs import BIN, POTTERY, picture
+from programs import BIN, POTTERY, mount_fat, picture
 
 MIB = 1 << 20
 
@@ -110,6 +110,22 @@ class Gate(StudioTest):
         self.assertEqual(len(names), 8, names)  # with the link's, link-2.png
         self.assertEqual(self.running.project()["problems"], [])
 
+    def test_what_models_name_outside_the_folder_is_not_read(self):
+        """What such files say never shows, nor whether they are there: they are missing, and wanted next to the model."""
+        outside = self.folder.parent / (self.folder.name + "-outside.mtl")
+        outside.write_text("newmtl a\nmap_Kd the-secret.png\n")
+        self.addCleanup(outside.unlink)
+        (self.folder / "link.mtl").symlink_to(outside)
+        faces = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n"
+        for i, name in enumerate((f"../{outside.name}", f"../../../../../../..{outside}", str(outside), "link.mtl", f"..\\{outside.name}")):
+            for there in (outside.name, "none.mtl"):
+                named = name.replace(outside.name, there)
+                added = self.good(self.running.put(f"m{i}{there}.obj", f"mtllib {named}\n{faces}".encode()))
+                self.assertEqual(added["missing"], [there if name != "link.mtl" else name], name)
+        for i, key in enumerate(("images", "buffers")):
+            added = self.good(self.running.put(f"g{i}.gltf", json.dumps({key: [{"uri": f"../{outside.name}"}]}).encode()))
+            self.assertEqual(added["missing"], [outside.name], key)
+
     def test_archives_bring_files_and_nothing_else(self):
         link = zipfile.ZipInfo("link.obj")
         link.external_attr = (stat.S_IFLNK | 0o777) << 16
@@ -180,6 +196,39 @@ class Gate(StudioTest):
             print(f"5 GB: {time.monotonic() - start:.1f} s")
             self.assertLess(time.monotonic() - start, 20)  # however loaded the machine is; to read them takes a minute then
 
+    def test_slow_connections_keep_nobody_waiting(self):
+        """Many that send nothing, half a head, a body in drops, with and without the secret: the page is answered at once, and they are closed."""
+        head = f"PUT {self.running.secret}api/files/slow.obj HTTP/1.1\r\nHost: 127.0.0.1:{self.running.port}\r\nContent-Length: 1000000\r\n\r\n"
+        begun = [b"", b"G", head[:60].encode(), head.encode(), head.encode() + b"#" * 70000, head.replace(self.running.secret, "/").encode() + b"#" * 70000]
+        slow = []
+        for i in range(240):
+            connection = socket.create_connection(("127.0.0.1", self.running.port))
+            try:
+                connection.sendall(begun[i % len(begun)])
+            except (ConnectionResetError, BrokenPipeError):
+                pass
+            slow.append(connection)
+        start = time.monotonic()
+        for _ in range(5):
+            self.assertEqual(self.running.get("api/project").status, 200)
+            for connection in slow:
+                try:
+                    connection.send(b"#")
+                except OSError:
+                    pass
+            self.assertLess(time.monotonic() - start, 5)
+        self.assertEqual(self.good(self.running.post("api/edit", {"revision": self.running.project()["revision"], "edits": []}))["problems"], [])
+        for connection in slow[-len(begun):]:  # the latest are not closed for those after them
+            connection.settimeout(20)
+            try:
+                while connection.recv(65536):
+                    pass
+            except ConnectionResetError:
+                pass
+        self.assertLess(time.monotonic() - start, 20)
+        for connection in slow:
+            connection.close()
+
     def test_many_connections_and_listeners_are_bounded(self):
         silent = [socket.create_connection(("127.0.0.1", self.running.port)) for _ in range(12)]
         self.assertEqual(self.running.get("api/project").status, 200)
@@ -213,6 +262,27 @@ class Process(StudioTest):
             studio.process.send_signal(sent)
             self.assertEqual(studio.wait(), 0)
 
+    def test_a_disk_without_hard_links_permissions_and_all_names(self):
+        """A stick: files and archives arrive, the same name twice keeps both, and a name that FAT refuses is reported as such."""
+        picture(self.folder / "a.png")
+        picture(self.folder / "b.png", mirrored=True)
+        first, second = ((self.folder / name).read_bytes() for name in ("a.png", "b.png"))
+        stick = mount_fat(self) / "museum"
+        studio = self.studio(stick)
+        for data, name in ((first, "a.png"), (first, "a.png"), (second, "a-2.png")):
+            self.assertEqual(self.good(studio.put("a.png", data))["added"], [name])
+        archive = zip_of(("pottery.obj", POTTERY.read_bytes()), ("pottery.mtl", POTTERY.with_suffix(".mtl").read_bytes()))
+        self.assertEqual(self.good(studio.put("pot.zip", archive))["added"], ["pot/pottery.obj", "pot/pottery.mtl"])
+        self.assertEqual([(stick / name).read_bytes() for name in ("a.png", "a-2.png", "pot/pottery.obj")], [first, second, POTTERY.read_bytes()])
+        refused = studio.put("what?.png", first)
+        if not (stick / "what?.png").exists():  # not every driver refuses it
+            self.assertGreaterEqual(refused.status, 400)
+        self.good(studio.edit({"op": "set", "table": "bake", "key": "loop-views", "value": 8},
+                              {"op": "add", "table": "scene", "value": {"pattern": "a", "model": "pottery"}}))
+        self.assertEqual(studio.job("api/bake", {})[0], "baked")
+        self.assertEqual(studio.job("api/export", {"kind": "release"})[0], "exported")
+        self.assertEqual(studio.quit(), 0)
+
     def test_killed_at_any_time_it_loses_nothing(self):
         """Studios die while they save: the file is what it was before an edit or after it. MODAR_KILLS=100 kills as many."""
         picture(self.folder / "a.png")
@@ -226,10 +296,10 @@ class Process(StudioTest):
             number = last
             while time.monotonic() < deadline:
                 number += 1
-                answer = studio.edit({"op": "set", "table": "pattern", "index": 0, "key": "width-mm", "value": number})
+                answer = studio.edit({"op": "set", "table": "pattern", "index": 0, "key": "width", "value": f"{number}mm"})
                 self.assertEqual(answer.status, 200)
             revision = studio.project()["revision"]
-            body = json.dumps({"revision": revision, "edits": [{"op": "set", "table": "pattern", "index": 0, "key": "width-mm", "value": number + 1}]})
+            body = json.dumps({"revision": revision, "edits": [{"op": "set", "table": "pattern", "index": 0, "key": "width", "value": f"{number + 1}mm"}]})
             connection = http.client.HTTPConnection("127.0.0.1", studio.port)
             connection.request("POST", studio.secret + "api/edit", body, {"Content-Type": "application/json"})
             time.sleep(rng.uniform(0, 0.006))
@@ -237,9 +307,9 @@ class Process(StudioTest):
             connection.close()
             text = toml.read_text()
             read = tomllib.loads(text)["pattern"][0]
-            self.assertIn(read.get("width-mm", 0), (number, number + 1))
+            self.assertIn(int(read.get("width", "0mm")[:-2]), (number, number + 1))
             self.assertTrue(text.startswith('# mine\n[[pattern]]\nfile = "a.png" # mine, too\n'))
-            last = read.get("width-mm", 0)
+            last = int(read.get("width", "0mm")[:-2])
         self.studio().quit()
         self.assertEqual(sorted(path.name for path in self.folder.iterdir()), [".modar", "a.png", "modar.toml"])
 

@@ -17,7 +17,7 @@ PROJECT = ['[project]\nname = "vases"   # of the bundle\n', 'project.name = "vas
            "[project]\n'name' = '''vases'''\n", ""]
 SCENES = [
     '[[scene]] # the first\npattern = "a"\nmodel = "pottery"\nturn = 90 # degrees\ntext.en = "A vase"\n#scale = 2\n\n'
-    '[[scene.label]]\nname = "rim"\ntext.en = "Mended # in 1890"\n',
+    '[[scene.label]]\nname = "rim"\ntext.en = "Fixed # in 1890"\n',
     '[[ scene ]]\n  pattern = "b"\n  "model" = \'pottery\'\n  offset = [ # in mm\n    0, 0,\n    10, # up\n  ]\n  [scene.text]\n  de = "Eine \\"Vase\\""\n',
     '[[scene]]\npattern="a"\nmodel="pottery"\ntext = { en = "x", de = "]}#" }\nname = "second"\nscale = 1\n',
     '[[scene]]\npattern = "b"\nmodel = "pottery"\nname = """three\nlines = 1"""\n',
@@ -99,13 +99,13 @@ class Edit(StudioTest):
 
     def test_tables_come_go_and_split(self):
         studio = self.studio()
-        text = ("# head\n[[model]]\nfile = \"pottery.obj\"\n\n# two pictures\n[[pattern]]\nfile = [\"?.png\"]\n#width-mm = 1\n\n# what stands\n"
+        text = ("# head\n[[model]]\nfile = \"pottery.obj\"\n\n# two pictures\n[[pattern]]\nfile = [\"?.png\"]\n#width = \"1mm\"\n\n# what stands\n"
                 "[[scene]]\npattern = \"a\"\nmodel = \"pottery\"\n\n[[scene]]\npattern = \"b\"\nmodel = \"pottery\"\n")
         self.write(text)
         # One of the glob's two gets a table of its own.
-        self.good(studio.edit({"op": "set", "table": "pattern", "name": "b", "key": "width-mm", "value": 210}))
+        self.good(studio.edit({"op": "set", "table": "pattern", "name": "b", "key": "width", "value": "210mm"}))
         patterns = self.read()["pattern"]
-        self.assertEqual(patterns, [{"file": ["?.png", "!b.png"]}, {"file": "b.png", "width-mm": 210}])
+        self.assertEqual(patterns, [{"file": ["?.png", "!b.png"]}, {"file": "b.png", "width": "210mm"}])
         view = {one["name"]: one for one in studio.project()["patterns"]}
         self.assertEqual((view["b"]["width_mm"], view["a"]["width_mm"], view["a"]["shared"]), (210, None, False))
         # A new name goes through the scenes.
@@ -117,7 +117,7 @@ class Edit(StudioTest):
         self.good(studio.edit({"op": "add", "table": "scene", "value": {"pattern": "a", "model": "pottery", "turn": 30}}))
         self.assertEqual(self.read()["scene"][1], {"pattern": "a", "model": "pottery", "turn": 30})
         now = self.toml.read_text()
-        for comment in ("# head\n", "# two pictures\n", "#width-mm = 1\n", "# what stands\n"):
+        for comment in ("# head\n", "# two pictures\n", "#width = \"1mm\"\n", "# what stands\n"):
             self.assertIn(comment, now)
         for _ in range(4):
             self.good(studio.post("api/undo", {}))
@@ -137,12 +137,12 @@ class Edit(StudioTest):
         revision = studio.project()["revision"]
         by_hand = '[[pattern]]\nfile = "b.png" # mine\n'
         self.write(by_hand)
-        edit = {"op": "set", "table": "pattern", "index": 0, "key": "width-mm", "value": 100}
+        edit = {"op": "set", "table": "pattern", "index": 0, "key": "width", "value": "100mm"}
         answer = studio.edit(edit, revision=revision)
         self.assertEqual((answer.status, answer.json["code"]), (409, "studio.changed"))
         self.assertEqual(self.toml.read_text(), by_hand)
         self.good(studio.edit(edit))
-        self.assertEqual(self.toml.read_text(), by_hand + "width-mm = 100\n")
+        self.assertEqual(self.toml.read_text(), by_hand + "width = \"100mm\"\n")
         self.good(studio.post("api/undo", {}))
         self.good(studio.post("api/undo", {}))  # the hand's own step
         self.assertEqual(self.toml.read_text(), '[[pattern]]\nfile = "a.png"\n')
@@ -154,19 +154,19 @@ class Edit(StudioTest):
         for edit, word in (({"op": "set", "table": "pattern", "index": 0, "key": "width", "value": 2}, "width"),
                            ({"op": "set", "table": "pattern", "index": 0, "key": "corners", "value": [[0, 0], [9, 9], [1, 2], [3, 3]]}, "corners"),
                            ({"op": "set", "table": "pattern", "index": 7, "key": "name", "value": "x"}, "[[pattern]] 8"),
-                           ({"op": "set", "table": "pattern", "name": "none", "key": "width-mm", "value": 1}, "none"),
+                           ({"op": "set", "table": "pattern", "name": "none", "key": "width", "value": "1mm"}, "none"),
                            ({"op": "add", "table": "scene", "value": {"pattern": "a", "model": "gone"}}, "gone"),
                            ({"op": "rename", "table": "scene"}, "rename")):
             answer = studio.edit(edit)
             self.assertEqual(answer.status, 422, edit)
             self.assertIn(word, answer.json["error"], edit)
             self.assertEqual(self.toml.read_text(), text)
-        self.write('[[pattern]]\nfile = "a.png"\nwidht-mm = 3\n\n[[pattern]]\nfile = "b.png"\n')
+        self.write('[[pattern]]\nfile = "a.png"\nwidht = 3\n\n[[pattern]]\nfile = "b.png"\n')
         project = studio.project()
         self.assertEqual([one["name"] for one in project["patterns"]], ["a", "b"])
-        self.assertEqual([(one["line"], one["cure"]) for one in project["problems"]], [(3, "did you mean 'width-mm'?")])
+        self.assertEqual([(one["line"], one["cure"]) for one in project["problems"]], [(3, "did you mean 'width'?")])
         # The table that is right may be edited meanwhile.
-        self.good(studio.edit({"op": "set", "table": "pattern", "index": 1, "key": "width-mm", "value": 5}))
+        self.good(studio.edit({"op": "set", "table": "pattern", "index": 1, "key": "width", "value": "5mm"}))
         self.write("[[pattern]\nfile = 3\n")
         self.assertEqual(studio.project()["problems"][0]["line"], 1)
         answer = studio.edit({"op": "set", "table": "project", "key": "name", "value": "x"})
@@ -176,17 +176,17 @@ class Edit(StudioTest):
         """A photo with corners bakes as what `modar pattern rectify` makes of it."""
         photo = self.folder / "photo.png"
         photo.write_bytes(COVER.read_bytes())
-        quick = "[bake]\nloop-views = 8\nscore = false\nparameters = [\"none\"]\n"
+        quick = "[bake]\nloop-views = 8\nscore = false\nparameters = \"none\"\n"
         corners = [[20, 15], [300, 25], [310, 600], [12, 580]]
         self.write(quick + '[[pattern]]\nfile = "photo.png"\nname = "cut"\n')
         studio = self.studio()
         self.good(studio.edit({"op": "set", "table": "pattern", "name": "cut", "key": "corners", "value": corners},
-                              {"op": "set", "table": "pattern", "name": "cut", "key": "width-mm", "value": 105},
-                              {"op": "set", "table": "pattern", "name": "cut", "key": "height-mm", "value": 210.5}))
+                              {"op": "set", "table": "pattern", "name": "cut", "key": "width", "value": "105mm"},
+                              {"op": "set", "table": "pattern", "name": "cut", "key": "height", "value": "210.5mm"}))
         view = studio.project()["patterns"][0]
         self.assertEqual((view["corners"], view["width_mm"], view["height_mm"]), (corners, 105, 210.5))
         done = self.modar("pattern", "rectify", photo, "--corners", ",".join(str(n) for corner in corners for n in corner),
-                          "--width-mm", "105", "--height-mm", "210.5", "-o", self.folder / "cut.png")
+                          "--width", "105mm", "--height", "210.5mm", "-o", self.folder / "cut.png")
         self.assertEqual(done.returncode, 0, done.stderr)
         words = ["--loop-views", "8", "--no-score", "--parameters", "none"]
         text = "flat,corners=" + ":".join(str(n) for corner in corners for n in corner) + ",height=210.5mm"

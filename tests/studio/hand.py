@@ -11,7 +11,7 @@ KEYS = {"Tab": 9, "Enter": 13, "Escape": 27, " ": 32, "ArrowLeft": 37, "ArrowUp"
 
 
 class Hand(Browser):
-    """clicks: presses of the mouse, with what was dragged or dropped meanwhile."""
+    """clicks: presses of the mouse, with the drags and drops meanwhile."""
 
     def __init__(self, folder, size=(1280, 720), extra=(), camera=""):
         """camera: a video that this machine's camera sees."""
@@ -80,14 +80,14 @@ class Hand(Browser):
         raise AssertionError(f"Tab does not reach {selector}")
 
     def choose(self, files):
-        """What a file chooser that has opened is told."""
+        """The answer to an open file chooser."""
         end = time.monotonic() + 90
         while not self.choosers and time.monotonic() < end:
             self.run("0")
         self.call("DOM.setFileInputFiles", files=[str(file) for file in files], backendNodeId=self.choosers.pop())
 
     def settle(self):
-        """Until what moves by itself has moved, and the server has done what it was asked for."""
+        """Until what moves by itself has moved, and the server has done what it was requested."""
         self.wait("!document.querySelector('[aria-busy]') && !document.querySelector('.status progress, .sending') && (!document.querySelector('.stage3d')"
                   " || document.querySelector('.layers canvas'))", "a rest")
         self.run("Promise.all(document.getAnimations().map((each) => each.finished.catch(() => 0))).then(() => 0)")

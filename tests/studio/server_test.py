@@ -2,6 +2,7 @@
 import http.client
 import json
 import os
+import re
 import shutil
 import stat
 import subprocess
@@ -11,10 +12,11 @@ import urllib.parse
 import zipfile
 
 from studio import Events, StudioTest
+from entry_test import museum
 from programs import BIN, COVER, POTTERY, ROOT, picture
 
-QUICK = '[project]\nname = "demo"\n\n[bake]\nloop-views = 8\nscore = false\nlods = 1\nparameters = ["none"]\n\n'
-SCENE = '[[model]]\nfile = "pottery.obj"\n\n[[pattern]]\nfile = "cover.png"\nwidth-mm = 210\n'
+QUICK = '[project]\nname = "demo"\n\n[bake]\nloop-views = 8\nscore = false\nlods = 1\nparameters = "none"\n\n'
+SCENE = '[[model]]\nfile = "pottery.obj"\n\n[[pattern]]\nfile = "cover.png"\nwidth = "210mm"\n'
 
 
 class Server(StudioTest):
@@ -24,6 +26,21 @@ class Server(StudioTest):
         picture(self.folder / "cover.png")
         (self.folder / "modar.toml").write_text(text)
         return self.studio()
+
+    def test_models_without_a_picture_are_told_of_as_modar_bake_does(self):
+        text = QUICK.replace('parameters = "none"\n', "") + SCENE.replace('"pottery.obj"', '["pottery.obj", "other.obj"]')
+        studio = self.fill(text + '[[scene]]\npattern = "cover"\nmodel = "pottery"\n')
+        shutil.copy(POTTERY, self.folder / "other.obj")
+        _, done, _ = studio.job("api/bake", {})
+        told = [finding for finding in done["findings"] if finding["id"] == "project.never-shown"]
+        self.assertEqual([finding["message"] for finding in told], ["no pattern shows the models other: they are left out"])
+        bundle = self.folder / "out" / "demo.modar"
+        self.assertEqual([model["name"] for model in self.modar_json("inspect", bundle)["models"]], ["pottery"])
+        self.assertEqual(set(self.modar_json("inspect", bundle)["patterns"][0]["keypoints"]), {"orb-2000"})
+        check = self.good(studio.get("api/check"))
+        self.assertEqual((check["good"], check["warnings"]), (True, 1))
+        [finding] = check["findings"]
+        self.assertEqual((finding["id"], finding["text"], finding["cure"]), (told[0]["id"], told[0]["message"], told[0]["cure"]))
 
     def test_bakes_the_bytes_of_modar_bake(self):
         studio = self.fill()
@@ -58,6 +75,51 @@ class Server(StudioTest):
         strip = studio.get("api/thumb/pottery.obj?size=64&turn=8")
         self.assertEqual((strip.status, strip.body[:2]), (200, b"\xff\xd8"), strip.body[:300])
         self.assertEqual(studio.get("api/thumb/none.obj?size=64&turn=8").status, 404)
+
+    def test_the_same_files_become_the_bundle_that_modar_bake_makes_of_them(self):
+        source = self.folder / "source"
+        source.mkdir()
+        museum(source)
+        files = sorted(source.iterdir())
+        baked = self.modar("bake", *files, "-o", self.folder / "files.modar", "--loop-views", "8", "--no-score")
+        self.assertEqual(baked.returncode, 0, baked.stderr)
+        studio = self.studio(self.folder / "project")
+        told = [problem for file in files for problem in self.good(studio.put(file.name, file.read_bytes()))["problems"]]
+        self.assertEqual([problem["where"].rsplit("/")[-1] for problem in told], ["IMG_1.HEIC"])
+        self.assertIn("heif-convert", told[0]["cure"])
+        found = self.good(studio.post("api/corners", {"file": "card.png"}))  # as the page does with each new picture
+        self.assertEqual((found["cut"], found["doubt"]), (True, False))
+        self.good(studio.edit({"op": "set", "table": "pattern", "name": "card", "key": "corners", "value": found["corners"]},
+                              *({"op": "set", "table": "bake", "key": key, "value": value} for key, value in (("loop-views", 8), ("score", False)))))
+        self.assertEqual(studio.job("api/bake", {})[0], "baked")
+        self.assertEqual(studio.get("api/bundle").body, (self.folder / "files.modar").read_bytes())
+
+    def test_what_is_shown_is_baked_before_the_rest(self):
+        """A picture of three and its model come first, the others follow, and the end is what `modar bake` writes."""
+        scenes = "".join(f'[[scene]]\npattern = "p{i}"\nmodel = "m{i}"\n\n' for i in range(3))
+        for i in range(3):
+            shutil.copy(POTTERY, self.folder / f"m{i}.obj")
+            picture(self.folder / f"p{i}.png", 140 + 10 * i, 108)
+        studio = self.fill(QUICK + '[[model]]\nfile = "m*.obj"\n\n[[pattern]]\nfile = "p?.png"\n\n' + scenes)
+        events = Events(studio)
+        self.assertEqual(studio.post("api/bake", {"shown": "p1"}).status, 202)
+        events.until({"shown"}, 90)
+        (self.folder / "seen.modar").write_bytes(studio.get("api/bundle").body)
+        project = studio.project()
+        name, done, seen = events.until({"baked", "failed"}, 90)
+        events.close()
+        self.assertEqual(name, "baked", done)
+        inside = self.modar_json("inspect", self.folder / "seen.modar")
+        self.assertEqual([(one["pattern"], one["model"]) for one in inside["scenes"]], [("p1", "m1")])
+        self.assertEqual([(one["pattern"], one["model"]) for one in project["bundle"]["scenes"]], [("p1", "m1")])
+        self.assertTrue(project["bundle"]["stale"])
+        self.assertEqual([one["state"] for one in done["assets"] if one["name"] in ("p1", "m1")], ["cached"] * 2)
+        self.assertFalse(studio.project()["bundle"]["stale"])
+        whole = (self.folder / "out" / "demo.modar").read_bytes()
+        shutil.rmtree(self.folder / ".modar")
+        self.assertEqual(self.modar("bake", "--quiet").returncode, 0)
+        self.assertEqual((self.folder / "out" / "demo.modar").read_bytes(), whole)
+        self.assertEqual([path.name for path in self.folder.glob(".modar-*")], [])
 
     def test_failures_name_cause_cure_and_place(self):
         studio = self.fill()
@@ -118,7 +180,7 @@ class Server(StudioTest):
     def test_advice_has_words_in_every_language(self):
         picture(self.folder / "strip.png", width=400, height=60)
         causes = json.loads(self.modar("pattern", "score", "strip.png", "--json").stdout)[0]["causes"]
-        words = {language: json.loads((ROOT / f"bake/studio/page/words/{language}.json").read_text()) for language in ("en", "de")}
+        words = {language: json.loads((ROOT / f"bake/extensions/studio/page/words/{language}.json").read_text()) for language in ("en", "de")}
         # Of what the checker says, a translation; not of damage, which no bake leaves, nor of what needs --source.
         issues = {key for key in words["de"] if key.startswith("issue.")}
         rows = [line.split(" | ") for line in self.modar("check", "--list-issues").stdout.splitlines() if line.startswith("| ") and " | " in line]
@@ -127,7 +189,8 @@ class Server(StudioTest):
         # English needs its own only where the command's cure is an option of it.
         own = {key for key in words["en"] if key.startswith("issue.")}
         self.assertLessEqual(own, {key for key in issues if key.endswith(".cure")})
-        self.assertEqual(words["en"].keys() - own, words["de"].keys() - issues)
+        errors = {key for key in words["de"] if key.startswith("error.")}
+        self.assertEqual(words["en"].keys() - own, words["de"].keys() - issues - errors)
         by_option = {row[0][2:] for row in rows[1:] if " --" in row[3] and f"issue.{row[0][2:]}" in issues}
         self.assertLessEqual({f"issue.{one}.cure" for one in by_option}, own)
         self.assertGreater(len(said), 10)
@@ -137,6 +200,54 @@ class Server(StudioTest):
         self.assertGreater(len(given), 1)
         for one in given:
             self.assertEqual(words["en"][f"advice.{one['id']}"].rstrip(".").lower(), one["advice"])
+
+    def test_errors_have_words_in_every_language(self):
+        """Of each code that the rooms below the page give: its own words, or those of its kind. And each word that the page asks for is there."""
+        rooms = ("extensions/studio", "project", "bundle", "options", "import", "image", "mesh", "texture", "pattern", "video", "io", "memory", "extensions/web", "ship")
+        text = "".join(path.read_text() for room in rooms for path in (ROOT / "bake" / room).rglob("*.?pp"))
+        text += "".join(path.read_text() for folder in ("formats/base", "runtime/platform", "runtime/record") for path in (ROOT / folder).rglob("*.cpp"))
+        codes = set(re.findall(r'(?:ExitCode::\w+,\s*|wrong\w*\(|bad_\w+\(|not_read\()"([a-z]+\.[a-z0-9-]+)"', text))
+        codes -= {code for code in codes if code.startswith(("calibrate.", "camera.", "confusion.", "pictures.", "simulate."))}  # of commands that the page does not have
+        codes |= set(re.findall(r'"([a-z]+\.[a-z0-9-]+)",\s*DiagnosticSeverity::kWarning', text))
+        self.assertGreater(len(codes), 150)
+        pages = "".join(path.read_text() for path in (ROOT / "bake/extensions/studio/page").glob("*.js"))
+        asked = set(re.findall(r"\bt\('([\w.]+)'", pages))
+        for language in ("en", "de"):
+            words = json.loads((ROOT / f"bake/extensions/studio/page/words/{language}.json").read_text())
+            self.assertEqual({word for word in asked if word not in words}, set())
+            if language == "en":
+                continue
+            self.assertEqual({code for code in codes if f"error.{code}" not in words and f"error.{code.split('.')[0]}" not in words}, set())
+            own = {key.removeprefix("error.") for key in words if key.startswith("error.") and key.count(".") > 1}
+            self.assertEqual({code for code in own if f'"{code}"' not in text}, set())  # none of a code that is gone
+
+    def test_the_verdict_is_that_of_the_commands(self):
+        """What `modar bake` warns of and `modar check` finds, neither more nor less; and of a device, what `modar check --device` says."""
+        studio = self.fill()
+        for name, damage in (("", None), ("mtl.missing-map", lambda: (self.folder / "pottery.png").unlink())):
+            if damage:
+                damage()
+            self.assertEqual(studio.job("api/bake", {})[0], "baked")
+            bundle = self.folder / "out" / "demo.modar"
+            for device in ("", *studio.project()["devices"]):
+                told = self.good(studio.get("api/check?device=" + device))
+                checked = self.modar("check", bundle, "--json", *(["--device", device] if device else []))
+                ours = json.loads(checked.stdout)["issues"]
+                found = [one for one in told["findings"] if "." not in one["id"]]
+                self.assertEqual([(one["id"], one["severity"]) for one in found], [(one["id"], one["severity"]) for one in ours])
+                self.assertEqual([one["id"] for one in told["findings"] if "." in one["id"]], [name] if name else [])
+                self.assertEqual(told["good"], checked.returncode == 0)
+                self.assertEqual(told["warnings"], sum(one["severity"] == "warning" for one in told["findings"]))
+            fits = {one["name"]: one for one in studio.get("api/devices").json}
+            for device, one in fits.items():
+                report = self.modar("check", bundle, "--device", device)
+                self.assertEqual(one["fits"], report.returncode == 0)
+                self.assertEqual(sum(f["severity"] != "info" for f in one["findings"]), sum(line.split()[0] in ("warning", "error") for line in report.stdout.splitlines()[1:]))
+        # README's steps 2 and 3: a usual bake is good on such a phone, without a warning, and says so in whole words.
+        report = self.modar("check", bundle, "--device", "mali400")
+        self.assertEqual(report.returncode, 0)
+        self.assertNotIn("warning", report.stdout)
+        self.assertNotIn("(byte", report.stdout)
 
     def test_alike_pictures_are_rivals(self):
         for name in ("one", "two"):
@@ -174,17 +285,21 @@ class Server(StudioTest):
         tools = self.folder.parent / (self.folder.name + "-tools")
         tools.mkdir()
         self.addCleanup(shutil.rmtree, tools)
-        for tool in ("bash", "sh", "sed", "dirname", "head", "tr", "env", "python3", "cat", "grep", "mkdir", "pwd"):
-            (tools / tool).symlink_to(shutil.which(tool))
-        studio = self.studio(env={"PATH": str(tools), "ANDROID_NDK": str(tools)})
-        self.assertEqual(studio.job("api/bake", {})[0], "baked")
-        name, told, _ = studio.job("api/export", {"kind": "apk"})
-        self.assertEqual((name, told["code"]), ("failed", "studio.package"), told)
-        self.assertIn("aapt", told["package"])
-        studio.end()
-        refused = self.studio().post("api/export", {"kind": "apk"})  # such an app would not start on any phone
-        self.assertEqual((refused.status, refused.json["code"]), (501, "studio.package"))
-        self.assertIn("ANDROID_NDK", refused.json["cure"])
+        (tools / "python3").symlink_to(shutil.which("python3"))
+        # Each is reported before anybody requests the app, and refused as well.
+        for env, code, word in (({"PATH": str(tools), "ANDROID_NDK": str(tools)}, "studio.app-tools", "aapt"), ({"ANDROID_NDK": ""}, "studio.app-ndk", "NDK"),
+                                ({"ANDROID_NDK": str(tools / "none")}, "studio.app-ndk", "NDK")):
+            studio = self.studio(env=env)
+            if not (self.folder / "out").exists():
+                self.assertEqual(studio.job("api/bake", {})[0], "baked")
+            told = studio.project()["app"]
+            self.assertEqual(told["code"], code)
+            self.assertIn(word, told["error"])
+            refused = studio.post("api/export", {"kind": "apk"})
+            self.assertEqual((refused.status, refused.json["code"]), (501, code))
+            studio.end()
+        listed = re.search(r"for tool in (.*);", (ROOT / "scripts/apk.sh").read_text())[1].split()
+        self.assertEqual(re.findall(r'"(\w+)"', re.search(r"const char\* tool : \{(.*?)\}", (ROOT / "bake/extensions/studio/exports.cpp").read_text(), re.S)[1]), listed)
 
     def test_200_models_and_100_pictures_open(self):
         for i in range(200):

@@ -22,8 +22,8 @@ from studio import StudioTest  # noqa: E402
 # A folder that keeps a picture of every step, for people.
 KEEP = os.environ.get("MODAR_WEB_PICTURES")
 MOST_CLICKS = 12
-# Where the bake's quality is not what is looked at: few views of a pattern, no score but the page's.
-QUICK = '[bake]\nloop-views = 8\nscore = false\nparameters = ["none"]\n\n'
+# Where the bake's quality does not matter: few views of a pattern, no score but the page's.
+QUICK = '[bake]\nloop-views = 8\nscore = false\nparameters = "none"\n\n'
 SIDE = 60  # cut from each side of the photo
 
 AXE = """axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] })
@@ -39,6 +39,19 @@ WATCH = """(() => {
   const stage = () => document.querySelector('.stage3d');
   new MutationObserver(() => seen.shown.push(performance.now())).observe(document.body, { subtree: true, attributeFilter: ['data-shown'] });
 })()"""
+
+
+# Controls that are cut off: outside of the window or of what hides what goes over it, other than what scrolls.
+CUT_OFF = """[...document.querySelectorAll('button, a[href], select, input:not(.unseen), label.button, textarea')].filter((each) => {
+  const box = each.getBoundingClientRect();
+  if (!each.checkVisibility() || !box.width || each.closest('.rail, .stage3d, .options')) return false;
+  const out = (left, right) => box.left < left - 1 || box.right > right + 1;
+  for (let over = each.parentElement; over; over = over.parentElement) {
+    const { left, right } = over.getBoundingClientRect();
+    if (getComputedStyle(over).overflowX === 'hidden' && over.tagName !== 'BODY' && out(left, right)) return true;
+  }
+  return out(0, innerWidth) || (each.closest('.bar') && box.bottom > innerHeight);
+}).map((each) => (each.getAttribute('aria-label') ?? each.innerText) || each.id)"""
 
 
 def homography(points):
@@ -157,7 +170,7 @@ class Page(StudioTest):
         self.assertEqual(self.hand.run(AXE), [], name)
 
     def assert_no_errors(self):
-        """A bake or an export that is asked for while one ends is refused, and asked for again."""
+        """A bake or an export that is requested while one ends is refused, and asked for again."""
         self.assertEqual([error for error in self.hand.errors if not ("409" in error and error.endswith(("api/bake", "api/export")))], [])
 
     def toml(self):
@@ -189,7 +202,7 @@ class Page(StudioTest):
     def site(self):
         return next(path.parent for path in self.project.rglob("site.json"))
 
-    # ---- by hand ----
+    # ---- other editors ----
 
     def drag_a_corner(self):
         """Away and back to where the frame's corner is, in one go; the preview follows within its time."""
@@ -220,7 +233,7 @@ class Page(StudioTest):
         self.assertTrue(waits)
 
     def drag_a_handle(self, kind, by, name):
-        """What is dragged is drawn in the event that moves it."""
+        """A dragged model is drawn in the event that moves it."""
         hand = self.hand
         x, y = hand.place(f"[data-handle={kind}]")
         hand.run("seen.drawn.length = 0")
@@ -270,7 +283,7 @@ class Page(StudioTest):
         self.other_looks()
 
     def try_it(self):
-        """The camera and a film see the wall: its name is told, the pot is drawn."""
+        """The camera and a film see the wall: its name is reported, the pot is drawn."""
         hand = self.hand
         hand.camera("granted")
         hand.run("location.hash = '#/try'")
@@ -352,7 +365,7 @@ class Page(StudioTest):
         hand.settle()
         self.assertIn("turn = 30", self.toml())
         self.wait_for('height = "292mm"')
-        hand.press("z", modifiers=2)  # Ctrl: in a field, the field's own; beside it, the project's
+        hand.press("z", modifiers=2)  # Ctrl: in a field, the field's own; next to it, the project's
         hand.tab_to(".foot a.primary")
         hand.press("Enter")
         hand.wait("location.hash === '#/try'", "the next screen")
@@ -391,7 +404,7 @@ class Page(StudioTest):
         self.wait_for("corners")
         self.keep_fox("corner")
         fox.tap("input[value=a4]")
-        self.wait_for("width-mm = 297")
+        self.wait_for("width = \"297mm\"")
         fox.tap(".foot a.primary")
         fox.wait("document.querySelector('.layers canvas')", "the stage")
         before = self.toml()
@@ -419,7 +432,7 @@ class Page(StudioTest):
         self.hand.press("Tab")
 
     def test_a_scan_on_a_cup_as_a_ruler_says_it(self):
-        """Lengths only. The cup is seen under the model, and what stands on it is measured in its millimetres."""
+        """Lengths only. The cup is seen under the model, and its models are measured in its millimetres."""
         self.project.mkdir()
         picture(self.project / "band.png")
         picture(self.project / "twin.png")
@@ -430,7 +443,7 @@ class Page(StudioTest):
         hand.run("location.hash = '#/picture/band'")
         hand.wait("document.querySelector('canvas[data-shown]')", "the preview, below which the lengths are")
         hand.click("input[value=a4]")
-        self.wait_for("width-mm = 297")
+        self.wait_for("width = \"297mm\"")
         hand.wait("document.querySelector('.advice a')", "the twin, which is a rival")
         self.assertEqual(hand.run("document.querySelector('.advice a').hash"), "#/picture/twin")
         hand.click("input[value=cone]")
@@ -454,7 +467,7 @@ class Page(StudioTest):
         self.assertAlmostEqual(band["width_mm"], 110, delta=0.1)
 
     def test_a_label_on_a_can_is_found_in_a_film_of_it(self):
-        """What is tried here is what a device does: both know the can of the same film, and the pot stands on it."""
+        """This tries the behaviour of a device: both know the can of the same film, and the pot is on it."""
         self.project.mkdir()
         picture(self.project / "band.png", 480, 360)
         shutil.copy(POTTERY, self.project)
@@ -485,14 +498,14 @@ class Page(StudioTest):
         picture(self.project / "cover.png")
         for name in ("pottery.obj", "pottery.mtl", "pottery.png"):
             shutil.copy(POTTERY.with_name(name), self.project)
-        text = ('[bake]\nloop-views = 8\nparameters = ["none"]\n\n[[pattern]]\nfile = "cover.png"\nwidth-mm = 200\n\n[[model]]\nfile = "pottery.obj"\n\n'
+        text = ('[bake]\nloop-views = 8\nparameters = "none"\n\n[[pattern]]\nfile = "cover.png"\nwidth = "200mm"\n\n[[model]]\nfile = "pottery.obj"\n\n'
                 '[[scene]]\npattern = "cover"\nmodel = "pottery"\n')
         (self.project / "modar.toml").write_text(text)
         self.start()
         hand = self.hand
         hand.run("location.hash = '#/scene/cover'")
         hand.wait("document.querySelector('.layers canvas')", "the stage")
-        by_hand = text + "turn = 33  # by hand\nheight = \"90mm\"\n\n# the end\n"
+        by_hand = text + "turn = 33  # other editor\nheight = \"90mm\"\n\n# the end\n"
         (self.project / "modar.toml").write_text(by_hand)
         hand.wait("document.getElementById('turn-2').value === '33' && document.getElementById('size').value === '9'", "what the hand has written")
         hand.tab_to("#offset-lift")
@@ -513,7 +526,7 @@ class Page(StudioTest):
     # ---- what cannot be used ----
 
     def test_what_cannot_be_used_is_named_with_its_cure(self):
-        """Kinds that nothing here reads stay outside; what is damaged is named, and leaves the project by a click."""
+        """Kinds that nothing here reads stay outside; damaged parts is named, and leaves the project by a click."""
         self.project.mkdir()
         picture(self.project / "cover.png")
         shutil.copy(POTTERY, self.project)
@@ -523,7 +536,10 @@ class Page(StudioTest):
         self.start()
         hand = self.hand
         hand.drop(sorted(self.source.iterdir()))
-        hand.wait("document.querySelectorAll('.problems .finding').length === 3", "what is wrong")
+        hand.wait("document.querySelectorAll('.problems .finding').length === 2", "kinds that are not read")
+        # What no scene shows is not baked: it is found to be damaged once it is placed.
+        (self.project / "modar.toml").write_text(self.toml() + '\n[[scene]]\npattern = "cover"\nmodel = "broken"\n')
+        hand.wait("document.querySelectorAll('.problems .finding').length === 3", "the fault")
         told = hand.run("document.querySelector('.problems').innerText")
         for words in ("IMG_1.HEIC", "JPEG", "vase.fbx", "GLB", "broken.obj", "no usable face"):
             self.assertIn(words, told)
@@ -532,6 +548,70 @@ class Page(StudioTest):
         hand.click(".problems .link")
         hand.wait("document.querySelectorAll('.problems .finding').length === 2 && document.querySelector('.status')?.textContent.includes('Ready')", "a bake")
         self.assertNotIn("broken", self.toml())
+
+    # ---- small and large windows, and numbers ----
+
+    def test_nothing_is_cut_off_from_360_to_1600_pixels(self):
+        """Every control of every step is in the window, in both languages, with a name that is long and a dozen of models."""
+        self.project.mkdir()
+        for name in ("cover", "the poster of the exhibition in the east wing"):
+            picture(self.project / f"{name}.png")
+        for i in range(12):
+            (self.project / f"a-vase-with-a-long-name-{i}.obj").write_text("v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
+        scene = '[[scene]]\npattern = "cover"\nmodel = "a-vase-with-a-long-name-3"\n'
+        (self.project / "modar.toml").write_text(QUICK + '[project]\nname = "treasures of the old museum"\n[[pattern]]\nfile = "*.png"\nwidth = "200mm"\n[[model]]\nfile = "*.obj"\n' + scene)
+        self.start()
+        hand = self.hand
+        hand.wait("document.querySelector('.status')?.textContent.includes('Ready')", "the bake")
+        for language in ("en", "de"):
+            hand.open(self.url + "?lang=" + language)
+            for view in ("files", "picture/cover", "scene/cover", "try", "ship"):
+                hand.run(f"location.hash = '#/{view}'")
+                hand.wait("document.querySelector('h1')", view)
+                hand.settle()
+                for width in (360, 480, 600, 780, 810, 900, 1000, 1100, 1280, 1600):
+                    hand.resize(width, 720)
+                    hand.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))).then(() => 0)")
+                    self.assertEqual((hand.run(CUT_OFF), hand.run("document.documentElement.scrollWidth")), ([], width), (language, view, width))
+                    if width in (360, 780, 1280):
+                        self.keep(f"{language}-{view.split('/')[0]}-{width}")
+        self.assert_no_errors()
+
+    def test_numbers_and_errors_in_german(self):
+        """A decimal comma is shown and read; what a model is put upright with is there after it was tipped over; errors have German words."""
+        self.project.mkdir()
+        picture(self.project / "cover.png")
+        shutil.copy(POTTERY, self.project)
+        (self.project / "modar.toml").write_text(QUICK + '[[pattern]]\nfile = "cover.png"\nwidth = "200mm"\n\n[[model]]\nfile = "pottery.obj"\n\n'
+                                                 '[[scene]]\npattern = "cover"\nmodel = "pottery"\nheight = "123.5mm"\n')
+        (self.source / "modar.toml").write_text("x = 1\n")
+        self.start(words="?lang=de")
+        hand = self.hand
+        hand.run("location.hash = '#/scene/cover'")
+        hand.wait("document.querySelector('.layers canvas')", "the stage")
+        self.assertEqual(hand.run("document.getElementById('size').value"), "12,35")
+        for typed, toml, shown in (("7,25", 'height = "72.5mm"', "7,25"), ("8.5", 'height = "85mm"', "8,5"), ("1.230,0", 'height = "12300mm"', "1230"),
+                                   ("9", 'height = "90mm"', "9")):
+            hand.run("document.getElementById('size').select()")
+            hand.call("Input.insertText", text=typed)
+            hand.run("document.getElementById('size').blur()")
+            self.wait_for(toml)
+            hand.wait(f"document.getElementById('size').value === '{shown}'", typed)
+        upright = "[...document.querySelectorAll('.row.three button')].find((each) => each.innerText.trim() === 'Aufrecht')"
+        self.assertTrue(hand.run(f"{upright}.disabled"))
+        before = self.toml()
+        hand.click(".row.three button")
+        self.wait_for("up = ")
+        hand.wait(f"!{upright}.disabled", "something to undo")
+        hand.run(f"{upright}.click()")
+        hand.wait(f"{upright}.disabled", "the model in its old state")
+        self.assertEqual(self.toml(), before)
+        hand.run("location.hash = '#/files'")
+        hand.wait("document.querySelector('.cards')", "the files")
+        hand.drop([self.source / "modar.toml"])
+        hand.wait("document.querySelectorAll('.problems .finding').length > 0", "the fault")
+        self.assertIn("Mit diesem Namen", hand.run("document.querySelector('.problems').innerText"))
+        self.assertEqual(hand.run("[...document.querySelectorAll('[lang=en]')].filter((each) => each.checkVisibility() && each.tagName !== 'OPTION').map((each) => each.innerText)"), [])
 
     # ---- names and texts ----
 

@@ -1,5 +1,5 @@
-// Atlases: rectangles that hold what is shown and never overlap, colours that stay those of the
-// pictures.
+// Atlases: rectangles that hold the visible content and never overlap, colours that stay those of
+// the pictures.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -8,7 +8,6 @@
 #include <set>
 
 #include "bake/image/difference.hpp"
-#include "bake/lab/etc1_bench.hpp"
 #include "bake/texture/texture_stage.hpp"
 #include "tests/texture/texture_samples.hpp"
 
@@ -45,7 +44,7 @@ TEST(Coverage, WrapsAroundAndSurvivesNonsense) {
   EXPECT_EQ(count(huge), 64U);
 }
 
-/// Whether a triangle and the unit square at (x, y) meet: what is left of the triangle when it is
+/// Whether a triangle and the unit square at (x, y) meet: the rest of the triangle when it is
 /// clipped to the square (Sutherland and Hodgman, "Reentrant polygon clipping", 1974).
 bool meets_square(const Triangle& corners, double x, double y) {
   std::vector<std::array<double, 2>> polygon(corners.begin(), corners.end());
@@ -291,23 +290,6 @@ TEST(QualityGate, NamesTheWorstBlockAndDrawsAPicture) {
   Report quiet;
   ASSERT_TRUE(bake_texture(folder.file("spot.png"), options, quiet));
   EXPECT_TRUE(quiet.diagnostics.empty());
-}
-
-TEST(Etc1Bench, HasItsSixRows) {
-  const test::ScratchFolder folder;
-  ASSERT_TRUE(write_png(test::synthetic_photo(40, 36), folder.file("photo.png")));
-  const auto rows = bench_etc1({folder.file("photo.png")}, 32);
-  ASSERT_TRUE(rows) << to_line(rows.error());
-  const std::vector<std::string> names = {"fast_db",     "fast_mpix_s", "good_db",
-                                          "good_mpix_s", "best_db",     "best_mpix_s"};
-  ASSERT_EQ(rows->size(), names.size());
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    EXPECT_EQ((*rows)[i].measure, names[i]);
-    EXPECT_GT((*rows)[i].ours, 0);
-  }
-  EXPECT_GT((*rows)[2].ours, (*rows)[0].ours);
-  EXPECT_EQ(bench_etc1({}, 0).error().exit, ExitCode::kUsage);
-  EXPECT_EQ(bench_etc1({folder.file("photo.png")}, 30).error().code, "bench.crop");
 }
 
 }  // namespace

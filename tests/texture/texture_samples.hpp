@@ -63,23 +63,6 @@ inline RgbaImage centre_crop(const RgbaImage& image, std::uint32_t side) {
   });
 }
 
-/// Folder of test data that does not travel with the source; may not exist.
-inline std::filesystem::path shared_data() {
-  if (const char* folder = std::getenv("MODAR_SHARED_DATA")) return folder;
-  const char* source = std::getenv("MODAR_SOURCE_DIR");
-  return std::filesystem::path(source ? source : ".") / ".." / "shared" / "data";
-}
-
-inline std::vector<std::filesystem::path> files_of(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> files;
-  std::error_code none;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
-    if (entry.is_regular_file()) files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
 /// A folder of its own for files of a test, removed at the end.
 class ScratchFolder {
  public:

@@ -1,9 +1,9 @@
 // What scripts/foreign.sh budget counts the instructions of, under qemu with a counting plugin:
-// each measured step lies between two writes to stdout. Frames are rendered from the bundle's own
+// each measured step is between two writes to stdout. Frames are rendered from the bundle's own
 // pattern, so that nothing but the bundle is needed.
 // Usage: budget_probe track|search|clutter|sliced|extended|render|open|memory BUNDLE [WIDTH HEIGHT
 // [FRAMES [BUDGET]]] search: frames that show the pattern; clutter: frames without it; sliced:
-// both, within a budget of so many million instructions a frame; extended: before a wall, which
+// both, within a budget of some million instructions a frame; extended: before a wall, which
 // alone the last quarter of the frames shows; render: by null_gl.cpp; memory: tracks and
 // draws, and prints what memory the process holds after each stage. track-default, search-default:
 // while the camera is a guess, as apps have it that give none.

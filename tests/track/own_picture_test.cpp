@@ -23,7 +23,7 @@ modar_bundle* opened(const std::vector<std::byte>& bytes) {
 modar_tracker* tracker_of(const modar_bundle* bundle) {
   auto camera = sized<modar_camera>();
   modar_camera_default(kWidth, kHeight, &camera);
-  return modar_tracker_create(bundle, &camera, nullptr);
+  return modar_tracker_create(bundle, &camera, nullptr, nullptr);
 }
 
 modar_record* record_by_capi(const GrayImage& image, modar_error* error = nullptr) {
@@ -59,7 +59,8 @@ TEST(OwnPicture, IsTrackedAsIfItHadBeenBaked) {
     modar_pose poses[2];
     for (std::size_t k = 0; k < 2; ++k) {
       poses[k] = sized<modar_pose>();
-      ASSERT_EQ(modar_tracker_step(trackers[k], frame.picture.pixels.data(), kWidth, nullptr), 0);
+      ASSERT_EQ(modar_tracker_step(trackers[k], frame.picture.pixels.data(), kWidth, -1, nullptr),
+                0);
       visible += modar_tracker_pose(trackers[k], 1, &poses[k]);
     }
     EXPECT_EQ(std::memcmp(&poses[0], &poses[1], sizeof poses[0]), 0) << "frame " << i;
@@ -94,6 +95,10 @@ TEST(OwnPicture, BytesThatAreDamagedAreRefused) {
     EXPECT_EQ(modar_record_open(bytes.data(), cut, &error), nullptr) << cut;
     EXPECT_STREQ(error.code, "tracker.record");
   }
+  bytes[0] = std::byte{2};  // another feature extractor
+  EXPECT_EQ(modar_record_open(bytes.data(), bytes.size(), &error), nullptr);
+  EXPECT_STREQ(error.code, "tracker.record");
+  bytes[0] = std::byte{1};
   bytes[4] = std::byte{0xFF};  // more features than there are
   EXPECT_EQ(modar_record_open(bytes.data(), bytes.size(), &error), nullptr);
   EXPECT_EQ(modar_record_open(nullptr, 8, &error), nullptr);
@@ -108,8 +113,8 @@ TEST(OwnPicture, BytesThatAreDamagedAreRefused) {
 /// A photo of a picture on a green table, which its corners say.
 std::vector<std::uint8_t> photo_of(const cv::Mat& print, const double (&corners)[8], int width,
                                    int height) {
-  // Where a pixel lies on the picture is solved by Newton's method, which has nothing in common
-  // with what is tested.
+  // Where a pixel is on the picture is solved by Newton's method, which has nothing in common with
+  // the code under test.
   std::vector<std::uint8_t> rgba;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -156,21 +161,29 @@ TEST(OwnPicture, IsCutOutOfAPhoto) {
   constexpr int kPhotoWidth = 640;
   constexpr int kPhotoHeight = 480;
   constexpr double kTrue[8] = {120, 90, 520, 60, 0, 0, 150, 400};
+  const auto rgba_picture = [](const std::vector<std::uint8_t>& pixels) {
+    auto picture = sized<modar_picture>();
+    picture.format = MODAR_RGBA;
+    picture.width = kPhotoWidth;
+    picture.height = kPhotoHeight;
+    picture.planes[0] = pixels.data();
+    picture.strides[0] = 4 * kPhotoWidth;
+    return picture;
+  };
   const std::vector<std::uint8_t> photo = photo_of(print, kTrue, kPhotoWidth, kPhotoHeight);
   // The fourth corner, by the matrix that photo_of() uses.
   const double far_x = (kTrue[0] + 1.2 * kTrue[2] - kTrue[0] + 1.1 * kTrue[6] - kTrue[0]) / 1.3;
   const double far_y = (kTrue[1] + 1.2 * kTrue[3] - kTrue[1] + 1.1 * kTrue[7] - kTrue[1]) / 1.3;
   const double wanted[8] = {120, 90, 520, 60, far_x, far_y, 150, 400};
   float corners[8] = {};
-  ASSERT_EQ(modar_photo_corners(photo.data(), kPhotoWidth, kPhotoHeight, corners), 1);
+  modar_picture taken = rgba_picture(photo);
+  ASSERT_EQ(modar_photo_corners(&taken, corners), 1);
   for (int i = 0; i < 8; ++i) EXPECT_NEAR(corners[i], wanted[i], 6) << i;
   for (int i = 0; i < 8; ++i) corners[i] = static_cast<float>(wanted[i]);
   std::vector<std::uint8_t> flat(std::size_t{MODAR_FLAT_SIDE} * MODAR_FLAT_SIDE);
   int width = 0;
   int height = 0;
-  ASSERT_EQ(modar_photo_flat(photo.data(), kPhotoWidth, kPhotoHeight, corners, flat.data(), &width,
-                             &height),
-            1);
+  ASSERT_EQ(modar_photo_flat(&taken, corners, flat.data(), &width, &height), 1);
   ASSERT_GT(width, 200);
   ASSERT_LE(std::max(width, height), int{MODAR_FLAT_SIDE});
   double off = 0;
@@ -185,13 +198,15 @@ TEST(OwnPicture, IsCutOutOfAPhoto) {
   }
   EXPECT_LT(off / compared, 8.0);  // a picture that is shifted by two pixels is off by 20 and more
   std::swap(corners[0], corners[2]);  // crossed
-  EXPECT_EQ(modar_photo_flat(photo.data(), kPhotoWidth, kPhotoHeight, corners, flat.data(), &width,
-                             &height),
-            0);
+  EXPECT_EQ(modar_photo_flat(&taken, corners, flat.data(), &width, &height), 0);
   const std::vector<std::uint8_t> table(std::size_t{4} * kPhotoWidth * kPhotoHeight, 90);
-  EXPECT_EQ(modar_photo_corners(table.data(), kPhotoWidth, kPhotoHeight, corners), 0);
-  EXPECT_EQ(modar_photo_corners(table.data(), 1, 1, corners), 0);
-  EXPECT_EQ(modar_photo_corners(nullptr, 640, 480, corners), 0);
+  taken = rgba_picture(table);
+  EXPECT_EQ(modar_photo_corners(&taken, corners), 0);
+  taken.width = taken.height = 1;
+  EXPECT_EQ(modar_photo_corners(&taken, corners), 0);
+  taken.planes[0] = nullptr;
+  EXPECT_EQ(modar_photo_corners(&taken, corners), 0);
+  EXPECT_EQ(modar_photo_corners(nullptr, corners), 0);
 }
 
 }  // namespace

@@ -99,7 +99,7 @@ TEST(PaperTracker, FindsRenderedViewsWhereTheyAre) {
   }
 }
 
-// With BRISK: ORB at eight inliers "recognises" what is not there, which the article leaves so.
+// With BRISK: ORB at eight inliers "recognises" absent patterns, which the article leaves so.
 TEST(PaperTracker, TellsPatternsApartAndGivesTheSameAnswerTwice) {
   const Camera camera = small_camera();
   const cv::Mat first = test::textured_picture(300, 245, 21);

@@ -1,11 +1,11 @@
 // A camera that nobody measured: its focal length and the aspects of prints are estimated, and the
-// corners lie where the picture's corners are all the while.
+// corners are where the picture's corners are all the while.
 #include <gtest/gtest.h>
 
 #include <glm/common.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "bake/lab/field_scene.hpp"
+#include "bake/extensions/lab/field_scene.hpp"
 #include "modar/pose_loop.hpp"
 #include "tests/track/pose_loop_samples.hpp"
 
@@ -24,7 +24,7 @@ GrayPicture copy_of(const cv::Mat& print) {
 struct Played {
   int shown = 0;
   double worst = 0;        ///< corner of a frame, pixels
-  double worst_drawn = 0;  ///< the same of what is drawn on the picture's corners
+  double worst_drawn = 0;  ///< the same of the drawing on the picture's corners
   CameraEstimate camera;
   Reason last_reason = Reason::kVisible;
 };
@@ -43,7 +43,7 @@ void cover(const SceneFrame& scene, double share, std::uint32_t seed, GrayPictur
       .copyTo(pixels, mask);
 }
 
-/// The corners of what is drawn.
+/// The corners of the drawing.
 Detection drawn(const Detection& one, const Camera& camera, const glm::dmat4x3& stretch) {
   const auto flat = pattern_corners(picture().cols, picture().rows);
   Detection out = one;
@@ -141,7 +141,7 @@ TEST(UnknownCamera, CornersLieRightFromTheFirstFrameOn) {
       EXPECT_EQ(one.shown, kSecond / 2)
           << focal << " " << aspect << " " << to_string(one.last_reason);
       EXPECT_LT(one.worst, 1.5) << focal << " " << aspect;
-      EXPECT_LT(one.worst_drawn, 1.5) << "what is drawn " << focal << " " << aspect;
+      EXPECT_LT(one.worst_drawn, 1.5) << "the drawing " << focal << " " << aspect;
     }
   }
 }
@@ -167,7 +167,7 @@ TEST(UnknownCamera, CornersOfAMostlyCoveredPrintLieRightInItsFirstFrame) {
   EXPECT_GE(shown, 14);
 }
 
-// Chance patches on what covers a print hold some finds 80 to 140 pixels beside its place.
+// Chance patches on what covers a print hold some finds 80 to 140 pixels off.
 TEST(UnknownCamera, AFindWhosePatchesContradictEachOtherIsNotShown) {
   int shown = 0;
   for (std::uint32_t seed = 100; seed < 112; ++seed) {
@@ -203,7 +203,7 @@ TEST(UnknownCamera, AGivenOneIsNeverTouched) {
 }
 
 TEST(UnknownCamera, AFlatPrintOfAnotherAspectIsNotBent) {
-  // The loop is given a camera, so that a bend hides: a wrong aspect is none.
+  // The loop is given a camera, so that a bend hides: a wrong aspect is not.
   for (const double aspect : {0.94, 0.98, 1.04, 1.06}) {
     for (const double focal : {1.0, 1.2}) {
       const Played one = play(lens_of(640, 480, 640 * focal), aspect, kSecond / 2, false);

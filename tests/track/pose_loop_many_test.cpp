@@ -59,7 +59,7 @@ std::unique_ptr<PoseLoop> loop_of_many(bool track) {
   return std::move(*loop);
 }
 
-// Each frame stands for itself: what the index does not name has no second chance but its turn, one
+// Each frame counts alone: what the index does not name has no second chance but its turn, one
 // frame in sixteen.
 TEST(PoseLoopMany, EachIsFoundInTheFirstFrameAndForNoOther) {
   const auto loop = loop_of_many(false);

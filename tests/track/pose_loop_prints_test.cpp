@@ -1,10 +1,10 @@
-// What is not the pattern, or not flat, is not shown: mirror images, other editions of a series,
-// bent paper; and what is covered still is. What the loop says of how sure it is.
+// Prints that are not the pattern, or not flat, are not shown: mirror images, other editions of a
+// series, bent paper; and covered ones still are. What the loop says of how sure it is.
 #include <gtest/gtest.h>
 
 #include <opencv2/imgproc.hpp>
 
-#include "bake/lab/field_scene.hpp"
+#include "bake/extensions/lab/field_scene.hpp"
 #include "modar/pose_loop.hpp"
 #include "runtime/track/print_details.hpp"
 #include "runtime/track/print_verifier.hpp"
@@ -138,10 +138,10 @@ int differences(const tracker::TrackedPattern& print, const cv::Mat& seen) {
   return details.differences();
 }
 
-// Two cells of another picture, and seven beside them that show nothing: all nine are another
+// Two cells of another picture, and seven next to them that show nothing: all nine are another
 // print's. One cell of nine tells nothing of the others.
 TEST(Prints, WhatIsConnectedWithPrintedDifferencesDiffers) {
-  const int side = kDetailPixels * tracker::PrintDetails::kSide;
+  const int side = kDetailPixels * tracker::PrintDetails::kDetailSide;
   cv::Mat own = textured_picture(side, side, 41);
   const auto halves = [](cv::Mat& print, int at, bool upright) {
     cv::Mat cell = print(detail(at, at, 1, 1));
@@ -164,10 +164,10 @@ TEST(Prints, WhatIsConnectedWithPrintedDifferencesDiffers) {
   EXPECT_EQ(differences(*print, seen), 9);
 }
 
-// A stroke narrower than a sample of a whole cell in each quarter: upright, or lying in another
+// A stroke narrower than a sample of a whole cell in each quarter: upright, or being in another
 // print.
 TEST(Prints, WhatIsTooFineForACellIsComparedQuarterByQuarter) {
-  const int side = kDetailPixels * tracker::PrintDetails::kSide;
+  const int side = kDetailPixels * tracker::PrintDetails::kDetailSide;
   cv::Mat own = textured_picture(side, side, 41);
   const auto strokes = [](cv::Mat& print, int left, int top, bool upright) {
     cv::Mat cells = print(detail(left, top, 5, 1));
@@ -209,7 +209,7 @@ TEST(Prints, TheTitleItselfStaysWhenHeldAndWhenCovered) {
   }
 }
 
-/// The print as a photo of it shows it where the paper bulges: its middle lies off by a share of
+/// The print as a photo of it shows it where the paper bulges: its middle is off by a share of
 /// the longer side, its edges where they are.
 cv::Mat bulged(const cv::Mat& print, double share) {
   cv::Mat x(print.size(), CV_32F);
@@ -307,7 +307,7 @@ TEST(Prints, WhereMostIsCoveredTheRestIsFoundAndFlat) {
   EXPECT_GE(right, 6);
 }
 
-// Patches on what covers a print fit by chance, and held its pose up to 87 pixels beside its place.
+// Patches on what covers a print fit by chance, and held its pose up to 87 pixels off.
 TEST(Prints, WhereMostIsCoveredNoneIsShownBesideItsPlace) {
   const Camera camera = default_camera(kWidth, kHeight);
   PoseLoopOptions options;
@@ -319,7 +319,7 @@ TEST(Prints, WhereMostIsCoveredNoneIsShownBesideItsPlace) {
   band.area_high = 3.0;
   band.covered_low = band.covered_high = 0.7;
   TrackResult seen;
-  // Frames that such poses were shown in, 18 to 178 pixels beside.
+  // Frames that such poses were shown in, 18 to 178 pixels off.
   for (const std::uint32_t seed : {23u, 97u, 190u, 268u, 302u, 316u, 342u, 373u}) {
     Random random(seed);
     const Pose pose = draw_pose(band, gray(picture()), camera, random);
@@ -383,7 +383,7 @@ TEST(Prints, APoseBesideThePatternHasSlippedUnlessSomethingCoversIt) {
 }
 
 // As prints agree with others: here and there, and roughly. What covers a print leaves
-// whole parts of it as they are.
+// whole parts of it unchanged.
 TEST(Prints, OneThatAgreesHereAndThereIsNotShown) {
   const auto pattern = tracker::view_tracked_pattern(record(), 0);
   ASSERT_TRUE(pattern) << to_line(pattern.error());
@@ -522,7 +522,7 @@ TEST(Prints, OfTwoEditionsInTheBundleTheShownOneIsNamed) {
 }
 
 TEST(Prints, AMirrorImageIsNotShown) {
-  // A part of it is its own mirror image, beside the middle: there a search finds both.
+  // A part of it is its own mirror image, next to the middle: there a search finds both.
   cv::Mat motif = picture().clone();
   cv::Mat right;
   cv::flip(motif(cv::Rect(0, 0, 90, 240)), right, 1);

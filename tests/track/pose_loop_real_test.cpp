@@ -1,4 +1,4 @@
-// Our pose loop on photos and videos that none of us made, where the folder of real data is there.
+// The pose loop on photos and videos of others: those of the package opencv-doc.
 #include <array>
 #include <cmath>
 #include <string>
@@ -84,12 +84,12 @@ void expect_near(const Detection& detection, const std::array<glm::dvec2, 4>& tr
 
 // A painted wall, turned by some 40 degrees: the truth came with the photos.
 TEST(PoseLoopOnPhotos, FindsTheGraffitiFromTheSide) {
-  const std::string data = test::shared_data();
-  if (data.empty()) GTEST_SKIP() << "no real data here";
-  const cv::Mat pattern = read(data + "/pairs/graf/graf1.png");
-  const cv::Mat frame = read(data + "/pairs/graf/graf3.png");
+  const std::string data = test::opencv_photos();
+  if (data.empty()) GTEST_SKIP() << "opencv-doc is not installed";
+  const cv::Mat pattern = read(data + "/graf1.png");
+  const cv::Mat frame = read(data + "/graf3.png");
   cv::Mat truth;
-  cv::FileStorage(data + "/pairs/graf/H1to3p.xml", cv::FileStorage::READ)["H13"] >> truth;
+  cv::FileStorage(data + "/H1to3p.xml", cv::FileStorage::READ)["H13"] >> truth;
   const Finder finder(pattern, frame.size());
   const TrackResult result = finder.look(frame);
   ASSERT_EQ(result.visible.size(), 1u) << to_string(result.reason);
@@ -97,10 +97,10 @@ TEST(PoseLoopOnPhotos, FindsTheGraffitiFromTheSide) {
 }
 
 TEST(PoseLoopOnPhotos, FindsTheBoxAmongOtherThings) {
-  const std::string data = test::shared_data();
-  if (data.empty()) GTEST_SKIP() << "no real data here";
-  const cv::Mat pattern = read(data + "/pairs/box_in_scene/box.png");
-  const cv::Mat frame = read(data + "/pairs/box_in_scene/box_in_scene.png");
+  const std::string data = test::opencv_photos();
+  if (data.empty()) GTEST_SKIP() << "opencv-doc is not installed";
+  const cv::Mat pattern = read(data + "/box.png");
+  const cv::Mat frame = read(data + "/box_in_scene.png");
   const Finder finder(pattern, frame.size());
   const TrackResult result = finder.look(frame);
   ASSERT_EQ(result.visible.size(), 1u) << to_string(result.reason);
@@ -108,13 +108,13 @@ TEST(PoseLoopOnPhotos, FindsTheBoxAmongOtherThings) {
 }
 
 TEST(PoseLoopOnPhotos, SeesNothingInAVideoWithoutThePattern) {
-  const std::string data = test::shared_data();
-  if (data.empty()) GTEST_SKIP() << "no real data here";
-  cv::VideoCapture video(data + "/video/negative_tree/tree.avi");
+  const std::string data = test::opencv_photos();
+  if (data.empty()) GTEST_SKIP() << "opencv-doc is not installed";
+  cv::VideoCapture video(data + "/tree.avi");
   ASSERT_TRUE(video.isOpened());
   cv::Mat colour;
   ASSERT_TRUE(video.read(colour));
-  const Finder finder(read(data + "/video/box_a/pattern.png"), colour.size());
+  const Finder finder(read(data + "/box.png"), colour.size());
   int frames = 0;
   do {
     cv::Mat frame;

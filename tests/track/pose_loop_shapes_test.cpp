@@ -114,7 +114,7 @@ TEST(Shapes, CornersLieWhereOpenCvProjectsThem) {
 }
 
 /// White but for dark squares of 12 pixels around places of the picture: what the rays show must
-/// lie where OpenCV projects those places.
+/// are where OpenCV projects those places.
 TEST(Shapes, RaysShowPlacesWhereOpenCvProjectsThem) {
   cv::Mat dots(240, 300, CV_8UC1, cv::Scalar(255));
   std::vector<cv::Point> centres = {{60, 50}, {150, 120}, {210, 190}};
@@ -128,7 +128,7 @@ TEST(Shapes, RaysShowPlacesWhereOpenCvProjectsThem) {
       const auto pixel = projected({place_on(label->surface.half_arc(), label->surface.slope(),
                                              at.x / 150.0 - 1, 1 - at.y / 120.0)},
                                    pose)[0];
-      // The centre of gravity of what is darker than its surroundings.
+      // The centre of gravity of pixels darker than their surroundings.
       double sum = 0, x = 0, y = 0;
       for (int v = static_cast<int>(pixel.y) - 14; v <= static_cast<int>(pixel.y) + 14; ++v) {
         for (int u = static_cast<int>(pixel.x) - 14; u <= static_cast<int>(pixel.x) + 14; ++u) {

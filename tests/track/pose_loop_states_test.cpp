@@ -67,7 +67,7 @@ TEST(TrackerReason, NoGeometry) {
 }
 
 TEST(TrackerReason, FailedVerification) {
-  // A mirrored camera image shows the pattern's back: a strip of it is drawn as it is, so that
+  // A mirrored camera image shows the pattern's back: a strip of it is drawn unchanged, so that
   // matches agree, and everything else is not the pattern.
   const SceneFrame scene = frame_of(look_at(2.2, 0, 0, 0), plain(kWidth, kHeight, 90));
   GrayPicture part = scene.picture;
@@ -272,7 +272,7 @@ int frames_to_find(PoseLoop& loop, TrackResult& result) {
   return i;
 }
 
-// What is found in an older frame is brought to the present one; less budget, more frames.
+// A find in an older frame is moved to the present one; less budget, more frames.
 TEST(PoseLoopSliced, FindsOverSeveralFramesAndTheSameEachTime) {
   TrackResult first;
   TrackResult again;
@@ -285,7 +285,7 @@ TEST(PoseLoopSliced, FindsOverSeveralFramesAndTheSameEachTime) {
   const SceneFrame present =
       frame_of(look_at(2.6, 15, 20, 10 + 0.2 * (frames - 1), 0.004 * (frames - 1)), background());
   EXPECT_LT(worst_corner(first.visible[0], present), 1.0);
-  // A frame to copy, one to search, one to bring what was found here.
+  // A frame to copy, one to search, one to move the find here.
   EXPECT_EQ(frames_to_find(*loop_of(one_pattern(), sliced_search(1000)), again), 3);
 }
 
@@ -294,7 +294,7 @@ TEST(PoseLoopSliced, ForgetsWhatItSearchedForBeforeAReset) {
   TrackResult result;
   for (int i = 0; i < 2; ++i) ASSERT_TRUE(loop->step(moving_frame(i).view(), result));
   loop->reset();
-  // The search of before would be brought here now.
+  // The search of before would be moved here now.
   ASSERT_TRUE(loop->step(moving_frame(2).view(), result));
   EXPECT_TRUE(result.visible.empty());
   EXPECT_EQ(result.features, 0);

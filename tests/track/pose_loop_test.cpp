@@ -122,7 +122,8 @@ TEST(TrackerFeatures, SpareOnesAreTheNextStrongestOfFullCells) {
   }
 }
 
-/// In how many of so many single frames the picture is found; each within two pixels of its place.
+/// The number of single frames in which the picture is found; each within two pixels of its
+/// place.
 int found_in_frames(const PoseLoopOptions& options, const SceneBand& band, int frames) {
   const Camera camera = default_camera(640, 480);
   const auto bytes = bundle_with({record()});
@@ -335,8 +336,8 @@ TEST(PoseLoop, RecordsCutShortOrOfAnotherVersionAreRefused) {
   EXPECT_EQ(loop.error().code, "tracker.record-version");
 }
 
-// Whatever a damaged record says: it is refused, or the loop runs without touching what is not its
-// own.
+// Whatever a damaged record says: it is refused, or the loop runs without touching memory of
+// others.
 TEST(PoseLoop, DamagedRecordsDoNoHarm) {
   const Camera camera = default_camera(320, 240);
   SceneBand band;

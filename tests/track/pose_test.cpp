@@ -160,7 +160,7 @@ TEST(Pose, ClosedFormIsTheArticlesByOpenCvsSvd) {
     ASSERT_TRUE(h);
     const cv::Mat g = test::camera_matrix(camera).inv() * to_mat(*h);
     double lambda = 1.0 / cv::norm(g.col(0));
-    if (g.at<double>(2, 2) < 0) lambda = -lambda;  // the pattern lies before the camera
+    if (g.at<double>(2, 2) < 0) lambda = -lambda;  // the pattern is before the camera
     cv::Mat r(3, 3, CV_64F);
     cv::Mat(lambda * g.col(0)).copyTo(r.col(0));
     cv::Mat(lambda * g.col(1)).copyTo(r.col(1));
@@ -186,7 +186,7 @@ TEST(Pose, AMirroredPatternStillGetsARotation) {
   ASSERT_TRUE(pose);
   EXPECT_NEAR(cv::determinant(to_mat(pose->rotation)), 1.0, 1e-9);
   EXPECT_GT(pose->translation.z, 0.0);
-  // It is seen from behind: the camera's centre -R^T t lies below the pattern plane.
+  // It is seen from behind: the camera's centre -R^T t is below the pattern plane.
   const cv::Mat centre =
       -to_mat(pose->rotation).t() *
       cv::Mat(cv::Vec3d(pose->translation.x, pose->translation.y, pose->translation.z));

@@ -21,7 +21,7 @@ const Camera& camera() {
   return kCamera;
 }
 
-/// A picture in the pattern's world: where its middle lies, half its sides, how it is turned about
+/// A picture in the pattern's world: where its middle is, half its sides, how it is turned about
 /// the vertical.
 struct Poster {
   cv::Mat picture;
@@ -48,7 +48,7 @@ void draw(const Poster& poster, const View& view, cv::Mat& frame) {
   const cv::Vec3d u = view.rotation * right * (2.0 / poster.picture.cols);
   const cv::Vec3d v = view.rotation * up * (-2.0 / poster.picture.rows);
   const cv::Matx33d plane(u[0], v[0], corner[0], u[1], v[1], corner[1], u[2], v[2], corner[2]);
-  // Pixel centres of the picture lie half a pixel from its edge.
+  // Pixel centres of the picture are half a pixel from its edge.
   const cv::Matx33d centred(1, 0, 0.5, 0, 1, 0.5, 0, 0, 1);
   const cv::Matx33d map = cv::Matx33d(camera_matrix(camera())) * plane * centred;
   cv::Mat drawn;
@@ -204,7 +204,7 @@ TEST_F(SurroundingsTest, DoesNotGoWithWhatCoveredThePattern) {
   }
 }
 
-// What is left of a pattern that is covered says its pose, as it does without surroundings.
+// The rest of a pattern that is covered says its pose, as it does without surroundings.
 TEST_F(SurroundingsTest, LeavesTheFrameTheLastWord) {
   const auto plain = PoseLoop::create(BundleView::open(bundle_).value(), camera()).value();
   const auto same = [&](const cv::Mat& frame, int i) {

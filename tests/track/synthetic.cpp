@@ -151,7 +151,7 @@ void add_pattern(BundleContent& content, const cv::Mat& pattern, const std::stri
   described.descriptor_bytes = features->descriptor_bytes;
   described.keypoints = features->keypoints;
   described.descriptors = features->descriptors;
-  described.yml = features_to_yml(*features).value();
+  described.yml = features_to_yml(*features);
   PatternRecord record{};
   record.name = content.intern(name);
   record.width = static_cast<std::uint32_t>(pattern.cols);
@@ -174,13 +174,9 @@ std::vector<std::byte> bundle_bytes(const BundleContent& content) {
   return bytes;
 }
 
-std::string shared_data() {
-  const char* named = std::getenv("MODAR_SHARED_DATA");
-  const char* source = std::getenv("MODAR_SOURCE_DIR");
-  const std::string folder = named != nullptr    ? named
-                             : source != nullptr ? std::string(source) + "/../shared/data"
-                                                 : "";
-  return !folder.empty() && std::filesystem::is_directory(folder) ? folder : "";
+std::string opencv_photos() {
+  const std::string folder = "/usr/share/doc/opencv-doc/examples/data";
+  return std::filesystem::is_directory(folder) ? folder : "";
 }
 
 }  // namespace modar::test

@@ -1,5 +1,5 @@
 // Pictures of our own making for the tracking tests: textured patterns, and views of them rendered
-// from known poses by code that shares nothing with what is tested.
+// from known poses by code that shares nothing with the code under test.
 #pragma once
 
 #include <cstdint>
@@ -46,7 +46,7 @@ void add_pattern(BundleContent& content, const cv::Mat& pattern, const std::stri
 /// Writes the content; fails the test where that fails.
 std::vector<std::byte> bundle_bytes(const BundleContent& content);
 
-/// The folder of real data, or empty where there is none.
-std::string shared_data();
+/// The folder of the photos of Debian's package opencv-doc; empty if it is not installed.
+std::string opencv_photos();
 
 }  // namespace modar::test

@@ -21,11 +21,11 @@ HEADER, PIECE = 64, 64
 
 
 def range_from(at):
-    """What is asked for after the first stages: MOST_ASKED of runtime/web/arrival.js."""
+    """Requests after the first stages: MOST_ASKED of runtime/extensions/web/download.js."""
     return f"bytes={at}-{at + (4 << 20) - 1}"
 
 
-# {before, coarse, whole: hashes of what is drawn; events; error}
+# {before, coarse, whole: hashes of the drawing; events; error}
 DRAW = """(async () => {
   const [{ load }, { View }] = await Promise.all([import('/modar.js'), import('/modar-view.js')]);
   """ + CANVAS + """
@@ -231,7 +231,7 @@ class Arrival(ProgramTest):
             self.assertEqual(self.http.asked.pop(kind)[-len(asked):], asked)
 
     def visit(self, kind):
-        """A first visit, until the service worker keeps the page: requests of the bundle, their bytes, and what is kept."""
+        """A first visit, until the service worker keeps the page: requests of the bundle, their bytes, and the kept ones."""
         self.addCleanup(self.browser.open, f"http://localhost:{self.http.server_port}/site.json")
         self.browser.open(f"http://localhost:{self.http.server_port}/{kind}/")
         engine = "performance.getEntriesByType('resource').find(({ name }) => name.endsWith('/engine-simd.wasm'))"
@@ -252,9 +252,10 @@ class Arrival(ProgramTest):
         asked, sent = self.visit("visited")
         print(f"a first visit, with what the service worker fetches: {len(asked)} requests, {sent} bytes of a bundle of {len(self.http.packed)}")
         self.assertEqual((asked, sent), (staged, len(self.http.packed)))
-        # Of what was damaged on the way, no copy is kept: the worker brings its own.
+        # Of damaged downloads, no copy is kept: the worker downloads its own.
         asked, _ = self.visit("mended")
-        self.assertEqual(asked[:-1], [*staged, range_from(self.http.swapped[1][0])])
+        at, size, _ = self.http.swapped[1]
+        self.assertEqual(asked[:-1], [*staged, f"bytes={at}-{at + size - 1}"])
         self.assertIn(asked[-1], (None, "bytes=0-"))  # the browser's own range, of what it has in part
 
     def test_bytes_in_hand_and_lost_contexts(self):
@@ -306,7 +307,8 @@ class Arrival(ProgramTest):
                 asked = self.http.asked[kind]
                 self.assertGreater(len(asked), 1)
                 if kind == "flipped":  # that piece alone
-                    self.assertEqual(asked[1], f"bytes={self.http.swapped[0][0]}-")
+                    at, size, _ = self.http.swapped[0]
+                    self.assertEqual(asked[1], f"bytes={at}-{at + size - 1}")
 
     def test_what_stays_damaged_is_refused(self):
         for kind, code in (("forged", "piece."), ("version", "recipe.version"), ("count", "web.download"), ("none", "web.download")):

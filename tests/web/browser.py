@@ -32,9 +32,9 @@ CANVAS = """const canvas = (width, height) => {
 PART = """globalThis.part = (id) => document.getElementById(id)
   ?? document.querySelector('modar-viewer').shadowRoot.getElementById(id)"""
 
-# The service worker has what the visit brought, and a bundle.
+# The service worker has the visit's downloads, and a bundle.
 KEPT = """navigator.serviceWorker.ready.then(({ active }) => active.state === 'activated' && caches.keys())
-  .then((names) => names && !names.some((name) => name.endsWith(' brought')) && caches.match('bundles/demo.packed', { ignoreSearch: true }))
+  .then((names) => names && !names.some((name) => name.endsWith(' downloads')) && caches.match('bundles/demo.packed', { ignoreSearch: true }))
   .then(Boolean)"""
 # Bytes of answers that the page's process keeps for whoever debugs it: as many as it would hold itself, without this.
 NOTHING_KEPT = {"maxTotalBufferSize": 1, "maxResourceBufferSize": 1}

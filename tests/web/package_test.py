@@ -17,15 +17,25 @@ from programs import ROOT  # noqa: E402
 PAGE = ROOT / "build" / "web" / "web"
 HERE = pathlib.Path(__file__).resolve().parent / "package"
 # The newest two generations of Vite that this Node runs (Debian 12 has Node 18). Before 8, its server copies packages without the
-# files beside them.
+# files next to them.
 NODE = tuple(int(part) for part in subprocess.run(["node", "-p", "process.versions.node"], capture_output=True, text=True).stdout.split(".")) \
     if shutil.which("node") else ()
 VITES = ("vite7", "vite8") if NODE >= (20, 19) else ("vite5", "vite6")
-TOOLS = {**{vite: f"npm:vite@{vite[-1]}" for vite in VITES}, "typescript": "*", "webpack": "^5.100", "webpack-cli": "*"}
+TOOLS = {**{vite: f"npm:vite@{vite[-1]}" for vite in VITES}, "typescript": "*", "webpack": "^5.100", "webpack-cli": "*", "@types/react": "^19"}
 HTML = '<!doctype html><link rel="icon" href="data:,"><canvas id="picture"></canvas><canvas id="models"></canvas>%s'
 STRICT = {"compilerOptions": {"strict": True, "noUncheckedIndexedAccess": True, "target": "es2022", "module": "esnext", "types": [],
                               "moduleResolution": "bundler", "lib": ["es2022", "dom"], "noEmit": True}, "files": ["main.ts"]}
 WEBPACK = ["--mode", "production", "--entry", "./main.js", "--output-path", "packed", "--no-devtool"]
+
+
+JSX = """import { useRef } from 'react';
+import { type ModarViewer } from 'modar/viewer';
+
+export function Vase() {
+  const viewer = useRef<ModarViewer>(null);
+  return <modar-viewer ref={viewer} src="vase.modar" alt="A vase" max-bytes={1e6} className="wide" onClick={() => { void viewer.current?.look(); }} />;
+}
+"""
 
 
 class Package(unittest.TestCase):
@@ -68,7 +78,7 @@ class Package(unittest.TestCase):
         self.browser.errors.clear()
         self.browser.open(url)
         self.browser.wait("window.result !== undefined", "the end")
-        self.assertEqual(self.browser.run("window.result"), "cover,1,2,16,around,Start the camera,cover,1")
+        self.assertEqual(self.browser.run("window.result"), "cover,1,2,16,around,Start the camera,pottery,1")
         self.assertEqual(self.browser.errors, [])
         self.browser.open("about:blank")  # Vite's pages ask for their server when it is gone
 
@@ -80,11 +90,14 @@ class Package(unittest.TestCase):
     def test_it_holds_what_people_look_for(self):
         names = {file.name for file in (self.base / "node_modules" / "modar").iterdir()}
         engines = {f"engine-{kind}.{end}" for kind in ("simd", "plain", "record-simd", "record-plain") for end in ("js", "wasm")}
-        self.assertEqual(names, engines | {
+        self.assertEqual({name for name in names if not name.endswith(".map")}, engines | {
             "package.json", "README.md", "LICENSE", "modar.js", "modar.d.ts", "modar-view.js", "modar-view.d.ts", "modar-worker.js",
             "modar-viewer.js", "modar-viewer.d.ts", "modar-worker-simd.js", "modar-worker-plain.js", "gyroscope.js", "engine.js",
-            "arrival.js", "bundle.js", "camera.js", "storage.js", "turntable.js", "media.js", "viewer-parts.js", "viewer-words.js", "wanted.js", "words",
+            "arrival.js", "bundle.js", "camera.js", "download.js", "storage.js", "turntable.js", "media.js", "viewer-parts.js", "viewer-words.js", "lod-stream.js", "words",
+            "qr.js",
             "record-worker.js", "record-worker-simd.js", "record-worker-plain.js"})
+        maps = {name.removesuffix(".map") for name in names if name.endswith(".map")}
+        self.assertEqual(maps, {name for name in names if name.endswith(".js") and not name.startswith("engine-")})
         licence = (self.base / "node_modules" / "modar" / "LICENSE").read_text()
         for words in ("MIT License", "Mozilla Public License", "musl"):
             self.assertIn(words, licence)
@@ -102,6 +115,22 @@ class Package(unittest.TestCase):
             self.tool("typescript", "bin/tsc", "-p", ".")
         for bad in wrong.values():
             self.assertIn(f"Property '{bad}' does not exist", str(told.exception))
+
+    def test_react_knows_the_element(self):
+        """And TypeScript without React takes the same types: test_strict_types_hold() with its types out of the way."""
+        options = {**STRICT["compilerOptions"], "jsx": "react-jsx"}
+        told = {}
+        for name, text in {"good": JSX, "attribute": JSX.replace("src=", "scr="), "method": JSX.replace("look()", "lok()")}.items():
+            (self.base / f"{name}.tsx").write_text(text)
+            (self.base / f"{name}.json").write_text(json.dumps({"compilerOptions": options, "files": [f"{name}.tsx"]}))
+            told[name] = subprocess.run(["node", self.base / "node_modules/typescript/bin/tsc", "-p", f"{name}.json"], cwd=self.base, capture_output=True, text=True).stdout
+        self.assertEqual(told["good"], "")
+        self.assertIn("Property 'scr' does not exist", told["attribute"])
+        self.assertIn("Property 'lok' does not exist", told["method"])
+        types = self.base / "node_modules" / "@types"
+        types.rename(self.base / "types")
+        self.addCleanup((self.base / "types").rename, types)
+        self.tool("typescript", "bin/tsc", "-p", ".")
 
     def test_vite_builds_it(self):
         for vite in VITES:

@@ -38,7 +38,7 @@ async function tell() {
   if (told || root.dataset.update === undefined) return;
   told = true;
   const scope = new URL('./', location).href;
-  const { installedBundles, installedFile } = await import('./installed.js');
+  const { installedBundles, installedFile } = await import('./installed-release.js');
   const { release } = await (await fetch('site.json')).json();
   const bundles = await installedBundles(scope, release);
   const later = await installedBundles(scope, { ...release, version: 3 });

@@ -63,8 +63,8 @@ class Viewer(ProgramTest):
         return server.facts
 
     def assert_models_stand_on_the_picture(self, seen):
-        """The middle of what is drawn lies near the picture's corners as the event states them, in a frame that fills the layer."""
-        corners, camera = [seen["sighting"]["corners"][str(i)] for i in range(8)], seen["sighting"]["camera"]
+        """The middle of the drawing is near the picture's corners as the event states them, in a frame that fills the layer."""
+        corners, camera = [seen["detection"]["corners"][str(i)] for i in range(8)], seen["detection"]["camera"]
         scale = max(seen["width"] / camera["width"], seen["height"] / camera["height"])
         place = lambda axis, side: seen[side] / 2 + scale * (sum(corners[axis::2]) / 4 - camera[side] / 2)
         diagonal = scale * math.dist(corners[0:2], corners[4:6])
@@ -84,10 +84,10 @@ class Viewer(ProgramTest):
         self.assertEqual(facts["looking"]["stage"][:2], [0, 0])
         self.assertGreater(facts["looking"]["stage"][2], 500)
         self.assertGreater(facts["seen"]["lit"], 1000)
-        self.assertGreater(facts["seen"]["colour"], 20, "the camera's picture lies below")
+        self.assertGreater(facts["seen"]["colour"], 20, "the camera's picture is below")
         self.assert_models_stand_on_the_picture(facts["seen"])
         self.assertGreater(facts["larger"]["lit"], 1.05 * facts["seen"]["lit"])
-        self.assertEqual(facts["label"], {"name": "cover", "text": "Um 1890.", "lang": "de", "aria": facts["label"]["aria"]})
+        self.assertEqual(facts["label"], {"name": "pottery", "text": "Um 1890.", "lang": "de", "aria": facts["label"]["aria"]})
         self.assertIn("Eine Vase mit zwei Henkeln", facts["label"]["aria"])
         self.assertEqual(facts["found"], {"name": "cover", "view": 16})
         self.assertEqual(facts["photo"], "image/jpeg")

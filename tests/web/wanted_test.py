@@ -20,7 +20,7 @@ from browser import CANVAS, Browser, Quiet  # noqa: E402
 from programs import COVER, QUICK, ProgramTest  # noqa: E402
 
 STEPS = 72  # squares along a side of each ground
-BUDGET = 300_000  # bytes: one of them from near, and what is drawn until it has come
+BUDGET = 300_000  # bytes: one of them from near, and the drawing until it has come
 # Opens a view of a bundle, then draws it from places above the ground, [x, y, height] in its plane, each until nothing more comes; the
 # eye goes to and fro by `sway`.
 LOOK = """(async () => {
@@ -135,7 +135,7 @@ class Wanted(ProgramTest):
         for i in range(4):
             write_ground(cls.base / f"ground{i}.obj", i)
             models += ["--model", cls.base / f"ground{i}.obj", "--scene", f"cover=ground{i},up=z,scale=0.5,offset={i % 2 / 2 - 0.25}:{i // 2 / 2 - 0.25}:0"]
-        for words in (["bake", *models, "--pattern", COVER, "--no-ao", "--no-shadows", "-o", bundle, "--quiet", *QUICK], ["web", bundle, "-o", site, "--quiet"]):
+        for words in (["bake", *models, "--pattern", COVER, "--no-occlusion", "--no-shadows", "-o", bundle, "--quiet", *QUICK], ["web", bundle, "-o", site, "--quiet"]):
             done = test.modar(*words)
             if done.returncode != 0:
                 raise AssertionError(done.stderr)
@@ -159,7 +159,7 @@ class Wanted(ProgramTest):
                                        "sway": sway})
 
     def brought(self, kind):
-        """Bytes of the last stage that were asked for."""
+        """Requested bytes of the last stage."""
         return sum(end + 1 - max(start, self.http.first["ground.packed"]) for start, end in self.http.ranges[kind]
                    if end > self.http.first["ground.packed"])
 
@@ -173,11 +173,11 @@ class Wanted(ProgramTest):
                 self.assertEqual(seen.get("error"), None)
                 near, other, third = self.whole["last"]
                 self.assertEqual(seen["last"], [near, other, third, near])
-                self.assertNotEqual(seen["first"], near, "first what is there: the coarsest")
+                self.assertNotEqual(seen["first"], near, "first the present levels: the coarsest")
                 print(f"{name}: {seen['most']} bytes on the GPU of {self.whole['most']}, longest of {seen['frames']} frames {seen['longest']:.0f} ms")
                 self.assertLessEqual(seen["most"], BUDGET)
-                self.assertEqual((seen["fades"], seen["left"]), (1, 2), "what was seen fades over what is finer, one picture at a time")
-        # What made room for the others is brought again, and not all is ever brought.
+                self.assertEqual((seen["fades"], seen["left"]), (1, 2), "the old view fades over the finer one, one picture at a time")
+        # Evicted levels are downloaded again, and never all of them.
         asked = [(start, end) for start, end in self.http.ranges["right"] if end > start]
         self.assertGreater(len(asked), len(set(asked)))
 

@@ -10,17 +10,19 @@
 
 #include "bake/bundle/scene/scene_placement.hpp"
 #include "bake/image/image.hpp"
+#include "bake/options/request_text.hpp"
 #include "bake/process/process.hpp"
 #include "bake/texture/texture_stage.hpp"
 #include "bake/video/encode_video.hpp"
 #include "formats/base/nearest.hpp"
 #include "formats/base/path.hpp"
+#include "formats/rules.hpp"
 
 namespace modar {
 namespace {
 
 /// A node of the request: a scene's model, or one of request.nodes.
-struct Known {
+struct NodeSource {
   std::string pattern;
   std::string name;
   std::string group;
@@ -33,8 +35,8 @@ std::string name_of(const SceneRequest& scene) {
   return scene.name.empty() ? scene.model : scene.name;
 }
 
-std::vector<Known> known_nodes(const BakeRequest& request) {
-  std::vector<Known> known;
+std::vector<NodeSource> known_nodes(const BakeRequest& request) {
+  std::vector<NodeSource> known;
   for (std::size_t i = 0; i < request.scenes.size(); ++i) {
     const SceneRequest& scene = request.scenes[i];
     const bool asked = !scene.name.empty() || scene.hidden || !scene.group.empty();
@@ -48,11 +50,11 @@ std::vector<Known> known_nodes(const BakeRequest& request) {
 }
 
 /// The node that an action names.
-Result<Known*> find_node(std::vector<Known>& known, const ActionRequest& action,
-                         const std::string& name) {
+Result<NodeSource*> find_node(std::vector<NodeSource>& known, const ActionRequest& action,
+                              const std::string& name) {
   std::vector<std::string> names;
-  Known* found = nullptr;
-  for (Known& node : known) {
+  NodeSource* found = nullptr;
+  for (NodeSource& node : known) {
     if (node.pattern != action.pattern) continue;
     names.push_back(node.name);
     if (node.name != name) continue;
@@ -76,7 +78,7 @@ tl::unexpected<Error> cannot(const ActionRequest& action, const std::string& cau
 }
 
 /// Whether its target can do what an action asks for.
-Result<void> check_command(const ActionRequest& action, const Known& target) {
+Result<void> check_command(const ActionRequest& action, const NodeSource& target) {
   const bool label = target.kind == NodeKind::kLabel;
   const bool play =
       action.command == ActionCommand::kPlay || action.command == ActionCommand::kPause;
@@ -100,10 +102,10 @@ Result<void> check_command(const ActionRequest& action, const Known& target) {
 }
 
 /// Marks what actions name as asked for.
-Result<void> check_actions(const BakeRequest& request, std::vector<Known>& known) {
+Result<void> check_actions(const BakeRequest& request, std::vector<NodeSource>& known) {
   for (const ActionRequest& action : request.actions) {
     if (action.event == ActionEvent::kTap) {
-      MODAR_ASSIGN(Known* const source, find_node(known, action, action.source));
+      MODAR_ASSIGN(NodeSource* const source, find_node(known, action, action.source));
       source->asked = true;
       if (!action.part.empty() && source->kind != NodeKind::kModel) {
         return fail(ExitCode::kUsage, "action.part", action.where,
@@ -111,17 +113,17 @@ Result<void> check_actions(const BakeRequest& request, std::vector<Known>& known
       }
     }
     if (action.command == ActionCommand::kLink) continue;
-    MODAR_ASSIGN(Known* const target, find_node(known, action, action.target));
+    MODAR_ASSIGN(NodeSource* const target, find_node(known, action, action.target));
     target->asked = true;
     MODAR_TRY(check_command(action, *target));
   }
   return {};
 }
 
-/// Refuses two that are asked for under one name.
-Result<void> check_names(const BakeRequest& request, const std::vector<Known>& known) {
+/// Refuses two requests of one name.
+Result<void> check_names(const BakeRequest& request, const std::vector<NodeSource>& known) {
   std::set<std::pair<std::string, std::string>> names;
-  for (const Known& node : known) {
+  for (const NodeSource& node : known) {
     if (!node.asked || names.insert({node.pattern, node.name}).second) continue;
     const bool model = node.kind == NodeKind::kModel;
     return fail(ExitCode::kUsage, "node.same-name",
@@ -133,11 +135,11 @@ Result<void> check_names(const BakeRequest& request, const std::vector<Known>& k
 }
 
 /// All that are to become nodes, each with a name of its own.
-Result<std::vector<Known>> asked_nodes(const BakeRequest& request) {
-  std::vector<Known> known = known_nodes(request);
+Result<std::vector<NodeSource>> asked_nodes(const BakeRequest& request) {
+  std::vector<NodeSource> known = known_nodes(request);
   MODAR_TRY(check_names(request, known));
   MODAR_TRY(check_actions(request, known));
-  std::erase_if(known, [](const Known& node) { return !node.asked; });
+  std::erase_if(known, [](const NodeSource& node) { return !node.asked; });
   const auto too_many = [](const char* what, std::size_t count, std::uint32_t most) {
     return fail(ExitCode::kUsage, "node.too-many", what,
                 "there are " + std::to_string(count) + " of them",
@@ -167,13 +169,13 @@ class NodeMaker {
 
   Result<void> run() {
     MODAR_ASSIGN(known_, asked_nodes(request_));
-    for (const Known& node : known_) MODAR_TRY(add_node(node));
+    for (const NodeSource& node : known_) MODAR_TRY(add_node(node));
     for (const ActionRequest& action : request_.actions) MODAR_TRY(add_action(action));
     return {};
   }
 
  private:
-  Result<void> add_node(const Known& known) {
+  Result<void> add_node(const NodeSource& known) {
     NodeRecord node{};
     node.name = content_.intern(known.name);
     node.pattern = index_of(content_, content_.patterns, known.pattern);
@@ -195,7 +197,7 @@ class NodeMaker {
   }
 
   /// Groups count from 1, by pattern and name.
-  std::uint32_t group_number(const Known& known) {
+  std::uint32_t group_number(const NodeSource& known) {
     if (known.group.empty()) return 0;
     const std::pair key(known.pattern, known.group);
     const auto found = std::find(groups_.begin(), groups_.end(), key);
@@ -227,16 +229,14 @@ class NodeMaker {
       MODAR_TRY(add_player(request, node));
       set_alpha(request, node);
       const MediaRecord& media = content_.media[node.subject];
-      // Beside it is its alpha.
+      // Its alpha is next to it.
       const double width = media.width / (request.alpha == VideoAlpha::kBeside ? 2.0 : 1.0);
-      size_picture(request.place, mm, width, media.height, node);
-      return {};
+      return size_picture(request, mm, width, media.height, node);
     }
     MODAR_ASSIGN(node.subject, add_picture(request.file, request_.textures, content_, report_));
     const TextureRecord& texture = content_.textures[node.subject];
-    size_picture(request.place, mm, static_cast<double>(texture.source_width),
-                 static_cast<double>(texture.source_height), node);
-    return {};
+    return size_picture(request, mm, static_cast<double>(texture.source_width),
+                        static_cast<double>(texture.source_height), node);
   }
 
   static void set_alpha(const NodeRequest& request, NodeRecord& node) {
@@ -276,11 +276,18 @@ class NodeMaker {
   }
 
   /// mm: units of the plane in a millimetre. width, height: pixels.
-  static void size_picture(const SceneRequest& place, double mm, double width, double height,
-                           NodeRecord& node) {
+  static Result<void> size_picture(const NodeRequest& request, double mm, double width,
+                                   double height, NodeRecord& node) {
+    const SceneRequest& place = request.place;
     double unit = place.size.value / std::max(width, height);  // plane units in half a pixel
     if (place.size.kind == SceneSize::Kind::kWidth) unit = place.size.value * mm / 2 / width;
     if (place.size.kind == SceneSize::Kind::kHeight) unit = place.size.value * mm / 2 / height;
+    if (!(unit * std::max(width, height) <= kMostScale)) {
+      return fail(ExitCode::kUsage, "scene.size", request.where,
+                  "it would be " + rough_number_text(unit * std::max(width, height)) +
+                      " times as large as the pattern",
+                  "compare its size with the pattern's printed width, and their units");
+    }
     node.half_size[0] = static_cast<float>(unit * width);
     node.half_size[1] = static_cast<float>(unit * height);
     const glm::dquat turn = rotation_of(UpAxis::kZ, place.turn);
@@ -288,15 +295,16 @@ class NodeMaker {
     node.rotation[1] = static_cast<float>(turn.y);
     node.rotation[2] = static_cast<float>(turn.z);
     node.rotation[3] = static_cast<float>(turn.w);
-    if (place.centred) return;
-    // It stands on the plane, as models do.
+    if (place.centred) return {};
+    // It is on the plane, as models are.
     const glm::dmat3 axes = glm::mat3_cast(turn);
     node.place[2] +=
         static_cast<float>(unit * (std::fabs(axes[0].z) * width + std::fabs(axes[1].z) * height));
+    return {};
   }
 
   std::uint32_t node_index(const ActionRequest& action, const std::string& name) const {
-    const auto found = std::find_if(known_.begin(), known_.end(), [&](const Known& node) {
+    const auto found = std::find_if(known_.begin(), known_.end(), [&](const NodeSource& node) {
       return node.pattern == action.pattern && node.name == name;
     });
     return static_cast<std::uint32_t>(found - known_.begin());
@@ -343,7 +351,7 @@ class NodeMaker {
   BundleContent& content_;
   Report& report_;
   const MediaSource& source_;
-  std::vector<Known> known_;
+  std::vector<NodeSource> known_;
   std::vector<std::pair<std::string, std::string>> groups_;
   // A file is encoded once.
   std::map<std::pair<NodeKind, std::string>, std::uint32_t> media_of_file_;

@@ -14,8 +14,8 @@ namespace modar {
 
 /// Adds nodes, actions and the textures of pictures. content: has the request's patterns, models
 /// and scenes, which are content.scenes in this order. Errors: those of check_nodes() and of
-/// bake_texture(); kUsage "scene.no-width" where a length is asked for and the pattern's width is
-/// unknown, "action.part" for a part that is none of the model's materials; those of `source`.
+/// bake_texture(); kUsage "scene.no-width" where a length is requested and the pattern's width is
+/// unknown, "action.part" for a part that is not one of the model's materials; those of `source`.
 /// source: empty: bake_media().
 Result<void> add_nodes(const BakeRequest& request, BundleContent& content, Report& report,
                        const MediaSource& source = {});

@@ -10,6 +10,9 @@
 #include <glm/trigonometric.hpp>
 
 #include "bake/mesh/pack/vertex_codec.hpp"
+#include "bake/mesh/upright.hpp"
+#include "bake/options/request_text.hpp"
+#include "formats/rules.hpp"
 
 namespace modar {
 namespace {
@@ -116,6 +119,12 @@ TurnedBox turned_box(const BundleContent& content, const PlacedModel& model,
   return box;
 }
 
+TurnedBox box_of_mesh(const TriMesh& mesh, const glm::dmat3& turn) {
+  TurnedBox box;
+  for (const glm::dvec3& position : mesh.positions) box.add(turn * position);
+  return box;
+}
+
 /// Millimetres in a unit of the pattern's plane (half of its largest side); 0: unknown.
 double millimetres_in_unit(const PatternRecord& pattern) {
   const double width = 2 * static_cast<double>(pattern.half_width);
@@ -128,7 +137,34 @@ tl::unexpected<Error> scene_error(const char* code, const SceneRequest& request,
               cure);
 }
 
+/// What the requested size is the size of, in the unit of [-1,1]. Errors: "scene.flat".
+Result<double> extent_of(const SceneRequest& request, const TurnedBox& box) {
+  const glm::dvec3 sides = box.greatest - box.least;
+  const bool height = request.size.kind == SceneSize::Kind::kHeight;
+  const double extent = height ? sides.z : sides.x;
+  if (extent > kFlatShare * std::max({sides.x, sides.y, sides.z})) return extent;
+  const std::string name = height ? "height" : "width";
+  return scene_error(
+      "scene.flat", request,
+      "a " + name + " is requested, but the model is flat and has no " + name + " in that pose",
+      std::string("give its ") + (height ? "width=" : "height=") +
+          " or use scale=, or place it with another up= or turn=");
+}
+
+/// value, or 0 where a float would be next to zero: the checker takes such floats for damage.
+float stored_float(double value) {
+  const auto rounded = static_cast<float>(value);
+  return std::fpclassify(rounded) == FP_SUBNORMAL ? 0.0f : rounded;
+}
+
 }  // namespace
+
+Result<void> check_extent(const SceneRequest& request, const TriMesh& mesh, UpAxis up) {
+  if (request.size.kind == SceneSize::Kind::kScale) return {};
+  const glm::dquat rotation = rotation_of(request.up.value_or(up), request.turn);
+  MODAR_TRY(extent_of(request, box_of_mesh(mesh, glm::mat3_cast(rotation))));
+  return {};
+}
 
 bool needs_width(const SceneRequest& request) {
   return request.size.kind != SceneSize::Kind::kScale ||
@@ -152,16 +188,15 @@ Result<SceneRequest> resolve_scene(const SceneRequest& request, const BundleCont
   }
   if (request.size.kind != SceneSize::Kind::kScale) {
     const glm::dmat3 turn = glm::mat3_cast(rotation_of(*resolved.up, request.turn));
-    const TurnedBox box = turned_box(content, model, turn);
-    const bool height = request.size.kind == SceneSize::Kind::kHeight;
-    const double extent = height ? box.greatest.z - box.least.z : box.greatest.x - box.least.x;
-    if (!(extent > 0)) {
-      return scene_error(
-          "scene.flat", request,
-          std::string("the model has no ") + (height ? "height" : "width") + " as it stands",
-          "use scale=, or another up=");
-    }
+    MODAR_ASSIGN(const double extent, extent_of(request, turned_box(content, model, turn)));
     resolved.size = {SceneSize::Kind::kScale, request.size.value / unit_mm / extent};
+    if (!(resolved.size.value >= kLeastScale && resolved.size.value <= kMostScale)) {
+      return scene_error("scene.size", request,
+                         "the model would be " + rough_number_text(resolved.size.value) +
+                             " times as large as the pattern",
+                         "compare the length with the printed width of '" + request.pattern +
+                             "', and their units");
+    }
   }
   const bool in_mm = request.offset.unit == SceneOffset::Unit::kMillimetres ||
                      (request.offset.unit == SceneOffset::Unit::kUsual && unit_mm > 0);
@@ -180,17 +215,17 @@ SceneRecord place_scene(const SceneRequest& resolved, const BundleContent& conte
   SceneRecord scene{};
   scene.pattern = pattern;
   scene.model = model.index;
-  scene.scale = static_cast<float>(scale);
+  scene.scale = stored_float(scale);
   std::array<double, 3> offset = resolved.offset.value;
   for (double& value : offset) value *= 2;  // sides to units of the plane
   if (!resolved.centred) {
     offset[2] -= scale * turned_box(content, model, glm::mat3_cast(rotation)).least.z;
   }
-  for (std::size_t i = 0; i < 3; ++i) scene.offset[i] = static_cast<float>(offset[i]);
-  scene.rotation[0] = static_cast<float>(rotation.x);
-  scene.rotation[1] = static_cast<float>(rotation.y);
-  scene.rotation[2] = static_cast<float>(rotation.z);
-  scene.rotation[3] = static_cast<float>(rotation.w);
+  for (std::size_t i = 0; i < 3; ++i) scene.offset[i] = stored_float(offset[i]);
+  scene.rotation[0] = stored_float(rotation.x);
+  scene.rotation[1] = stored_float(rotation.y);
+  scene.rotation[2] = stored_float(rotation.z);
+  scene.rotation[3] = stored_float(rotation.w);
   return scene;
 }
 

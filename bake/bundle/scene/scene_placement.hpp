@@ -1,4 +1,4 @@
-// Where a scene's model stands on its pattern: from what the user said to the scene's record.
+// The place of a scene's model on its pattern: from what the user said to the scene's record.
 #pragma once
 
 #include <array>
@@ -6,6 +6,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 
+#include "bake/mesh/tri_mesh.hpp"
 #include "bake/options/request.hpp"
 #include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
@@ -16,11 +17,15 @@ namespace modar {
 /// Model axes to pattern axes: `up` to +z, then degrees about the pattern's x, y and z.
 glm::dquat rotation_of(UpAxis up, const std::array<double, 3>& turn);
 
-/// True where a length in millimetres is asked for, which needs the pattern's width.
+/// True where a length in millimetres is requested, which needs the pattern's width.
 bool needs_width(const SceneRequest& request);
 
 /// The error of such a scene where the width is unknown. kUsage "scene.no-width".
 tl::unexpected<Error> no_width(const SceneRequest& request);
+
+/// Whether a model has an extent along the axis whose size is requested. mesh: welded; up: for
+/// requests that name none. Errors: kUsage "scene.flat".
+Result<void> check_extent(const SceneRequest& request, const TriMesh& mesh, UpAxis up);
 
 /// The model that a scene places, in content.models.
 struct PlacedModel {
@@ -31,8 +36,8 @@ struct PlacedModel {
 
 /// The request with `up` set, its size as a factor and its offset in sides: as modar states it in
 /// the bundle's meta text. content: has the model and the pattern.
-/// Errors: kUsage "scene.no-width", where millimetres are asked for and the width is unknown;
-/// "scene.flat", where a height is asked for and the model has none.
+/// Errors: kUsage "scene.no-width", where millimetres are requested and the width is unknown;
+/// "scene.flat", as check_extent(); "scene.size", where the model would be beyond kMostScale.
 Result<SceneRequest> resolve_scene(const SceneRequest& request, const BundleContent& content,
                                    std::uint32_t pattern, const PlacedModel& model);
 

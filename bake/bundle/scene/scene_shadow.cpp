@@ -22,9 +22,8 @@
 namespace modar {
 namespace {
 
-constexpr std::uint32_t kSide = 64;  ///< texels: 4 KB a scene, as a shadow is soft
-/// Rays of a texel to the sky and to the key light: shares are in steps of 1.6 and 2.8 %, and a
-/// scene takes 0.4 million rays.
+constexpr std::uint32_t kShadowSide = 64;  ///< texels: 4 KB a scene, as a shadow is soft
+/// Rays of a texel to the sky. More make smoother shadows and take time.
 constexpr int kSkyRays = 64;
 constexpr int kKeyRays = 36;
 /// Half the angle under which the key light is seen, as a tangent: a lamp with a wide shade.
@@ -33,7 +32,7 @@ constexpr std::size_t kMostTriangles = 200'000;  ///< of the tree, where levels 
 /// Around the model's own box, in parts of its height: beyond, a shadow is too faint to see.
 constexpr double kMargin = 0.9;
 constexpr std::uint32_t kAlphaSide = 128;  ///< texels of a mask: finer than the shadow's are
-constexpr double kLift = 1e-4;             ///< pattern units: above what stands on the plane
+constexpr double kLift = 1e-4;             ///< pattern units: above the models on the plane
 
 /// Triangles of a level of detail, or of the coarsest that a chunk has.
 const LevelRecord& level_at(const BundleContent& content, const ChunkRecord& chunk,
@@ -76,7 +75,7 @@ AlphaMask alpha_mask(const BundleContent& content, std::uint32_t texture) {
   return mask;
 }
 
-/// What stands on the plane: corners of triangles, three after three, and what they let through.
+/// The models on the plane: corners of triangles, three after three, and what they let through.
 class Casters {
  public:
   Casters(const BundleContent& content, const SceneRecord& scene) {
@@ -163,11 +162,11 @@ void Casters::place(const BundleContent& content, const SceneRecord& scene) {
 
 struct Ray {
   glm::dvec3 direction;
-  double light = 0;  ///< that it brings to a plane that nothing hides
+  double light = 0;  ///< that it gives to a plane that nothing hides
 };
 
-/// Texels that are neighbours cast each its own part of the rays; blurred() gives all parts of a
-/// two by two square the same weight, so that what is left is hardly more than all rays' grain.
+/// Each neighbouring texel casts its own part of the rays; blurred() averages squares of two by
+/// two.
 constexpr std::uint32_t kParts = 4;
 
 /// What reaches the plane from all around: cosine-weighted, brighter where the light says so.
@@ -229,17 +228,17 @@ std::vector<double> blurred(const std::vector<double>& shares) {
   std::vector<double> from = shares;
   std::vector<double> to(shares.size());
   for (const bool down : {false, true}) {
-    for (std::uint32_t row = 0; row < kSide; ++row) {
-      for (std::uint32_t column = 0; column < kSide; ++column) {
+    for (std::uint32_t row = 0; row < kShadowSide; ++row) {
+      for (std::uint32_t column = 0; column < kShadowSide; ++column) {
         double sum = 0;
         for (int k = -2; k <= 2; ++k) {
-          const int at =
-              std::clamp(static_cast<int>(down ? row : column) + k, 0, static_cast<int>(kSide) - 1);
+          const int at = std::clamp(static_cast<int>(down ? row : column) + k, 0,
+                                    static_cast<int>(kShadowSide) - 1);
           const auto other = static_cast<std::uint32_t>(at);
           sum += kWeights[static_cast<std::size_t>(k + 2)] *
-                 from[down ? other * kSide + column : row * kSide + other];
+                 from[down ? other * kShadowSide + column : row * kShadowSide + other];
         }
-        to[row * kSide + column] = sum;
+        to[row * kShadowSide + column] = sum;
       }
     }
     std::swap(from, to);
@@ -267,22 +266,22 @@ std::vector<std::byte> scene_shadow(const BundleContent& content, std::uint32_t 
   }
   if (corners.empty() || high.z <= kLift) return {};
   const double margin = kMargin * (high.z - std::max(low.z, 0.0)) + 0.05;
-  ShadowHeader header{kSide, kSide, {}, {}, {}};
+  ShadowHeader header{kShadowSide, kShadowSide, {}, {}, {}};
   for (int axis = 0; axis < 2; ++axis) {
     header.low[axis] = static_cast<float>(low[axis] - margin);
     header.high[axis] = static_cast<float>(high[axis] + margin);
   }
   const std::vector<Ray> rays = light_rays(light_of(content, scene));
   const double reach = 2 * glm::length(high - low) + 1;
-  std::vector<double> shares(std::size_t{kSide} * kSide);
-  const auto place = [](std::uint32_t index) { return (index + 0.5) / kSide; };
-  parallel_rows(kSide, jobs, [&](std::uint32_t row) {
-    for (std::uint32_t column = 0; column < kSide; ++column) {
+  std::vector<double> shares(std::size_t{kShadowSide} * kShadowSide);
+  const auto place = [](std::uint32_t index) { return (index + 0.5) / kShadowSide; };
+  parallel_rows(kShadowSide, jobs, [&](std::uint32_t row) {
+    for (std::uint32_t column = 0; column < kShadowSide; ++column) {
       const double x = glm::mix(static_cast<double>(header.low[0]),
                                 static_cast<double>(header.high[0]), place(column));
       const double y = glm::mix(static_cast<double>(header.high[1]),
                                 static_cast<double>(header.low[1]), place(row));
-      double& left = shares[row * kSide + column];
+      double& left = shares[row * kShadowSide + column];
       for (std::size_t i = row % 2 * 2 + column % 2; i < rays.size(); i += kParts) {
         left += rays[i].light * casters.left({x, y, kLift}, rays[i].direction, reach);
       }
@@ -292,7 +291,7 @@ std::vector<std::byte> scene_shadow(const BundleContent& content, std::uint32_t 
   std::vector<std::byte> section(sizeof header + shares.size());
   std::memcpy(section.data(), &header, sizeof header);
   for (std::uint32_t i = 0; i < shares.size(); ++i) {
-    const double left = faded(shares[i], place(i % kSide), place(i / kSide));
+    const double left = faded(shares[i], place(i % kShadowSide), place(i / kShadowSide));
     section[sizeof header + i] =
         static_cast<std::byte>(std::lround(255 * std::clamp(left, 0.0, 1.0)));
   }

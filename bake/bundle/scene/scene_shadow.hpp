@@ -10,9 +10,9 @@
 namespace modar {
 
 /// The kShadow section of a scene: 64 x 64 texels (4 KB) of the light that a neutral room, or the
-/// scene's own light, leaves on the plane past what stands above it; what is transparent lets its
-/// part through. Empty where nothing does. content: with its models and scenes, and the scene's
-/// light where it has one. The same on any number of threads.
+/// scene's own light, leaves on the plane below the models; transparent parts let light through.
+/// Empty where nothing does. content: with its models and scenes, and the scene's light where it
+/// has one. The same on any number of threads.
 std::vector<std::byte> scene_shadow(const BundleContent& content, std::uint32_t scene,
                                     unsigned jobs);
 

@@ -12,7 +12,7 @@ namespace modar {
 namespace {
 
 constexpr std::uint64_t kMebibyte = 1u << 20;
-/// Vec4s of shaders/model.vert: projection 4, place in the scene 4, light 9, material 5.
+/// Vec4s of shaders/model.vert: projection, place in the scene, light, material.
 constexpr int kVertexUniforms = 22;
 /// Vec4s of the fragment shaders: opacity, or a camera picture's range and swap.
 constexpr int kFragmentUniforms = 2;
@@ -90,8 +90,7 @@ class DeviceCheck {
     if (half_ || halves == 0) return;
     widened_bytes_ += halves * model.vertex_count;
     tell(WorkstationRule::kDeviceHalfFloat, where, &layout,
-         std::to_string(halves) + " bytes of each of " + std::to_string(model.vertex_count) +
-             " vertices");
+         std::to_string(halves * model.vertex_count) + " bytes more");
   }
 
   /// Bytes of a vertex that are half floats.
@@ -107,7 +106,7 @@ class DeviceCheck {
   }
 
   /// Vertices and indices of the coarsest level of each chunk, as the device has them; of a model's
-  /// stand-in that needs least, where it has any.
+  /// proxy that needs least, where it has any.
   [[nodiscard]] std::uint64_t coarse_bytes(std::uint32_t model) const {
     const LayoutRecord& layout = bundle_.layouts()[bundle_.models()[model].layout];
     const std::uint64_t stride = layout.stride + (half_ ? 0 : half_bytes(layout));
@@ -156,8 +155,8 @@ class DeviceCheck {
     const void* first = bundle_.bytes().data();
     const std::uint64_t limit = device_.gpu_memory_mib * kMebibyte;
     if (gpu > limit) {
-      // The renderer keeps to the limit: it leaves out the largest mip levels, and what is nearest
-      // gets its finest levels first.
+      // The renderer keeps to the limit: it leaves out the largest mip levels, and the nearest
+      // parts get their finest levels first.
       const bool drawn = most_coarse_bytes_ <= geometry_share(texture_bytes_, limit) &&
                          most_coarse_bytes_ + smallest_bytes_ <= limit;
       tell(drawn ? WorkstationRule::kDeviceGpuDetail : WorkstationRule::kDeviceGpuMemory,

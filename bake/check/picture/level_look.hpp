@@ -1,4 +1,4 @@
-// Levels of detail beside the finest one, as the renderer draws both.
+// Levels of detail compared with the finest one, as the renderer draws both.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ glm::dmat4 view_from(const glm::dvec3& direction);
 
 /// A level where it is first drawn: as large as all chunks that have it show it, or a coarser one.
 struct LevelLook {
-  std::uint32_t level = 0;      ///< from 1 on; those of stand-ins follow those of chunks
+  std::uint32_t level = 0;      ///< from 1 on; those of proxies follow those of chunks
   double side_px = 0;           ///< diameter of the sphere around the model, mean of the views
   std::uint64_t triangles = 0;  ///< drawn, mean of the views
   std::uint64_t finest_triangles = 0;

@@ -15,7 +15,7 @@ namespace modar {
 namespace {
 
 /// A vertex after lighting and projection.
-struct Lit {
+struct ShadedVertex {
   double x = 0;  ///< pixels
   double y = 0;
   double inverse_depth = 0;  ///< 0: behind the camera
@@ -135,7 +135,7 @@ class Canvas {
     return glm::max(sum, 0.0) * static_cast<double>(options_.ambient_strength);
   }
 
-  [[nodiscard]] Lit shade(std::uint32_t v, std::uint32_t material) const {
+  [[nodiscard]] ShadedVertex shade(std::uint32_t v, std::uint32_t material) const {
     const SourceMaterial& m = mesh_.materials[material];
     const glm::dvec3 eye(to_eye_ * glm::dvec4(mesh_.positions[v], 1.0));
     glm::dvec3 n = glm::normalize(turn_ * glm::dvec3(mesh_.normals[v]));
@@ -152,7 +152,7 @@ class Canvas {
     const glm::dvec4 factors(mirror_factors(m.shininess, m.reflectance, m.metalness));
     const glm::dvec3 mirrored = sky(glm::reflect(ray, world), factors.x, factors.y);
     const double edge = std::pow(1 - std::min(std::fabs(glm::dot(world, ray)), 1.0), 5.0);
-    Lit lit;
+    ShadedVertex lit;
     lit.light = sky(world, 1, 1) + key * std::max(glm::dot(world, to_key), 0.0);
     lit.light = glm::mix(lit.light, mirrored, static_cast<double>(m.metalness));
     lit.added = srgb_to_linear(glm::dvec3(m.emission)) +
@@ -168,8 +168,8 @@ class Canvas {
     return lit;
   }
 
-  void fill(const std::array<Lit, 3>& v, const SoftTexture& texture, bool two_sided) {
-    for (const Lit& lit : v) {
+  void fill(const std::array<ShadedVertex, 3>& v, const SoftTexture& texture, bool two_sided) {
+    for (const ShadedVertex& lit : v) {
       if (lit.inverse_depth == 0) return;  // views keep models before the camera
     }
     const double area =
@@ -195,7 +195,7 @@ class Canvas {
     }
   }
 
-  void put(const std::array<Lit, 3>& v, const SoftTexture& texture, const glm::dvec3& b,
+  void put(const std::array<ShadedVertex, 3>& v, const SoftTexture& texture, const glm::dvec3& b,
            const glm::dvec3& step_x, const glm::dvec3& step_y, int x, int y) {
     const glm::dvec3 inverse(v[0].inverse_depth, v[1].inverse_depth, v[2].inverse_depth);
     const double near = glm::dot(b, inverse);
@@ -221,7 +221,7 @@ class Canvas {
     }
     depth_[at] = near;
     const glm::dvec3 albedo = srgb_to_linear(v[0].diffuse) * srgb_to_linear(glm::dvec3(base));
-    const auto seen_at = [&](const Lit& lit) {
+    const auto seen_at = [&](const ShadedVertex& lit) {
       return linear_to_srgb(albedo * lit.light + lit.added);
     };
     const glm::dvec3 colour = w.x * seen_at(v[0]) + w.y * seen_at(v[1]) + w.z * seen_at(v[2]);
@@ -238,7 +238,7 @@ class Canvas {
   RoomLight light_;
   const RenderOptions& options_;
   RgbaImage image_;
-  std::vector<double> depth_;  // 1 / z of what is nearest
+  std::vector<double> depth_;  // 1 / z of the nearest surface
 };
 
 }  // namespace

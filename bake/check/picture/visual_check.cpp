@@ -59,8 +59,8 @@ std::size_t shown_pixels(const RgbaImage& image, const std::array<std::uint8_t, 
   return count;
 }
 
-/// Of the pixels that the fullest view shows: a view that shows fewer sees a sheet from its edge,
-/// as a line of pixels that two renderers round to different places.
+/// Share of the fullest view's pixels. Smaller views see a sheet from its edge, which two renderers
+/// round differently.
 constexpr double kLeastShown = 0.02;
 
 RgbaImage cut(const RgbaImage& image, const Crop& crop) {
@@ -112,9 +112,9 @@ std::vector<std::byte> without_occlusion(const BundleView& bundle) {
   return bytes;
 }
 
-class Looker {
+class VisualComparer {
  public:
-  Looker(const BundleView& bundle, const VisualOptions& options, const IssueSink& sink)
+  VisualComparer(const BundleView& bundle, const VisualOptions& options, const IssueSink& sink)
       : bundle_(bundle), options_(options), sink_(sink) {
     render_.clear_colour = {0.5f, 0.5f, 0.5f, 1.0f};
     clear_ = {128, 128, 128};
@@ -131,7 +131,7 @@ class Looker {
     return renderer_->resize(options_.side, options_.side);
   }
 
-  /// Between the last look() and the first levels_of(): the models as they are.
+  /// Between the last look() and the first levels_of(): the unchanged models.
   Result<void> light_as_baked() {
     renderer_.reset();
     plain_bytes_ = {};
@@ -146,7 +146,7 @@ class Looker {
   Result<ModelLook> look(std::uint32_t index, const ModelRequest& asked) {
     Report quiet;
     MODAR_ASSIGN(SourceModel source, read_model(asked.path, {options_.jobs, asked.own_picture}));
-    MODAR_ASSIGN(TriMesh mesh, weld(std::move(source), quiet, {options_.jobs}));
+    MODAR_ASSIGN(TriMesh mesh, weld(std::move(source), quiet, {options_.jobs, options_.crease}));
     const auto upright = stated_upright(bundle_, index);
     ReliefOptions relief;
     relief.stands = rotation_of(upright ? upright->axis : UpAxis::kZ, {});
@@ -291,7 +291,7 @@ Result<std::vector<ModelLook>> check_looks(const BundleView& bundle, const Visua
                                            const IssueSink& sink) {
   std::vector<ModelLook> looks;
   if (bundle.models().empty()) return looks;
-  Looker looker(bundle, options, sink);
+  VisualComparer looker(bundle, options, sink);
   MODAR_TRY(looker.light_evenly());
   std::vector<std::uint32_t> models;  // of the looks
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {

@@ -1,4 +1,4 @@
-// Models of a bundle as the device shows them, beside their sources.
+// Models of a bundle as the device shows them, compared with their sources.
 #pragma once
 
 #include <array>
@@ -25,6 +25,7 @@ struct VisualOptions {
   double least_ssim = 0.9;           ///< gates, over what shows the model
   double greatest_delta_e = 4.0;
   unsigned jobs = 1;
+  double crease = 40;                         ///< of generated normals, see WeldOptions
   std::function<void(double done)> progress;  ///< may be empty
 };
 
@@ -44,8 +45,8 @@ struct ModelLook {
 /// An sRGB pixel in CIELAB (D65).
 glm::dvec3 lab_of(const std::uint8_t* pixel);
 
-/// Mean CIE 1976 colour difference over the pixels where both images differ from `clear`; 0 where
-/// there are none: outlines are for SSIM to judge. Images of one size, sRGB.
+/// Mean CIE 1976 colour difference over the pixels where both images differ from `clear`; 0 if
+/// none: outlines are for SSIM to judge. Images of one size, sRGB.
 double mean_delta_e(const RgbaImage& a, const RgbaImage& b,
                     const std::array<std::uint8_t, 3>& clear);
 

@@ -42,7 +42,7 @@ void take_three(const Json& stated, const char* key, std::array<double, 3>& valu
 }
 
 /// What the bundle calls the sources, where it is not the stem of their file's name: the user's own
-/// names come first, and two files of one name are told apart by the user alone.
+/// names come first, and only the user distinguishes two files of one name.
 template <class Asset>
 void read_names(const Json& document, const char* kind, std::vector<Asset>& assets) {
   for (const Json& stated : entries_of(document, kind)) {

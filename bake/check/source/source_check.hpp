@@ -10,14 +10,14 @@
 
 namespace modar {
 
-/// How a model lies to its source. Lengths in source units.
+/// How a model differs from its source, baked again. Lengths in source units; 0 for the same bytes.
 struct ModelFit {
   std::string name;
   bool same_bytes = false;      ///< baked again, it has the same bytes
   double stated_error = 0;      ///< position_error_max of the bundle
   double source_to_bundle = 0;  ///< greatest distance of samples of the one surface to the other
   double bundle_to_source = 0;
-  double colour_error = 0;  ///< greatest, of vertex colours, 0 to 1; 0 without
+  double colour_error = 0;  ///< mean, of vertex colours, 0 to 1; 0 without
 };
 
 struct SourceFit {
@@ -26,12 +26,13 @@ struct SourceFit {
   std::vector<std::string> different;  ///< and those that do not
 };
 
-/// Bakes `request` in memory and compares each asset of the bundle with its namesake: byte for
-/// byte, then the surfaces of models both ways in double precision, at their vertices and the
-/// centres of their triangles (a surface may be off by no more than the bundle states), materials
-/// and their textures, occlusion, the order of drawing, patterns' images, codes, widths and shapes,
-/// and scenes with their lights and shadows where the request has any. bundle: one that
-/// check_bundle() found good. Errors: those of the bake.
+/// Bakes `request` in memory, once, and compares each part of each asset with its counterpart by a
+/// hash. If the same version of this program baked the bundle, and not its assets apart, every
+/// difference is reported, by the asset, the part and the rule of its kind. Else hashes may
+/// differ, and what counts is measured: the distances of surfaces both ways (as far as both bakes
+/// state), the mean difference of vertex colours, the PSNR of textures, the images and codes of
+/// patterns, and the places of scenes; materials, shapes, widths, parameter sets and counts of the
+/// source must be the same. bundle: one that check_bundle() found good. Errors: those of the bake.
 Result<SourceFit> check_source(const BundleView& bundle, const BakeRequest& request,
                                const IssueSink& sink, Report& report);
 

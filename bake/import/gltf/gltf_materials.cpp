@@ -19,6 +19,9 @@
 #include "bake/import/conversion.hpp"
 #include "bake/import/gltf/gltf_pictures.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
+#include "bake/import/name_form.hpp"
+#include "bake/import/obj/mtl_reader.hpp"
+#include "bake/import/read_model.hpp"
 #include "bake/import/reflection.hpp"
 #include "formats/base/atomic_file.hpp"
 
@@ -29,10 +32,16 @@ namespace {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
+    // Not only where TMPDIR says: it may be full or read-only.
     std::error_code error;
-    const auto base = std::filesystem::temp_directory_path(error);
-    std::string name = (error ? std::string("/tmp") : base.string()) + "/modar-gltf-XXXXXX";
-    if (::mkdtemp(name.data()) != nullptr) path_ = name;
+    for (const std::string& base :
+         {std::filesystem::temp_directory_path(error).string(), std::string("/tmp"),
+          std::string("/var/tmp"), std::string("/dev/shm")}) {
+      std::string name = base + "/modar-gltf-XXXXXX";
+      if (base.empty() || ::mkdtemp(name.data()) == nullptr) continue;
+      path_ = name;
+      return;
+    }
   }
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
@@ -55,6 +64,15 @@ std::string plain_name(const std::string& name, const std::string& other) {
     if (good && plain.size() < 64) plain += c;
   }
   return plain.empty() ? other : plain;
+}
+
+/// The ending of a picture's file, by its first bytes, else by the type that is stated.
+const char* picture_ending(const std::vector<unsigned char>& bytes, const std::string& stated) {
+  const std::string_view start(reinterpret_cast<const char*>(bytes.data()),
+                               std::min<std::size_t>(bytes.size(), 12));
+  if (start.starts_with("\xFF\xD8")) return ".jpg";
+  if (start.starts_with("RIFF")) return ".webp";
+  return stated == "image/ktx2" ? ".ktx2" : ".png";
 }
 
 /// The part of opacity that a material gives up where all light goes through it. By eye: clear
@@ -129,7 +147,7 @@ tinygltf::PbrMetallicRoughness metallic_roughness_of(const tinygltf::Value& glos
 // Scales, turns, moves: the order and the sense of Khronos' sample viewer. (The matrix in the
 // extension's text turns the other way; viewers, and the extension's test model, turn this way.)
 
-void take_pair(const tinygltf::Value& transform, const char* key, glm::dvec2& pair) {
+void parse_pair(const tinygltf::Value& transform, const char* key, glm::dvec2& pair) {
   if (!transform.Has(key)) return;
   const tinygltf::Value& value = transform.Get(key);
   if (!value.IsArray() || value.ArrayLen() != 2) return;
@@ -146,8 +164,8 @@ GltfUv uv_of(const Info& texture) {
   const auto found = texture.extensions.find("KHR_texture_transform");
   if (found != texture.extensions.end() && found->second.IsObject()) {
     const tinygltf::Value& transform = found->second;
-    take_pair(transform, "offset", uv.offset);
-    take_pair(transform, "scale", uv.scale);
+    parse_pair(transform, "offset", uv.offset);
+    parse_pair(transform, "scale", uv.scale);
     if (transform.Has("rotation") && transform.Get("rotation").IsNumber()) {
       uv.rotation = transform.Get("rotation").GetNumberAsDouble();
     }
@@ -168,10 +186,10 @@ glm::dmat3 matrix_of(const GltfUv& uv) {
 
 class MaterialReader {
  public:
-  MaterialReader(const tinygltf::Model& gltf, std::string folder, std::string label,
+  MaterialReader(const tinygltf::Model& gltf, const ModelFolder& folder, std::string label,
                  std::vector<Diagnostic>& diagnostics)
       : gltf_(gltf),
-        folder_(std::move(folder)),
+        folder_(folder),
         label_(std::move(label)),
         diagnostics_(diagnostics),
         paths_(gltf.images.size()) {}
@@ -187,6 +205,7 @@ class MaterialReader {
     m.two_sided = source.doubleSided;
     set_reflection_of(pbr, m);
     set_pictures(source, m);
+    if (!repeats(pbr.baseColorTexture.index)) ++wrapped_;
     set_normal_map(source, m);
     m.opacity *= 1 - kClear * transmission_of(source);
     m.ambient = m.diffuse;
@@ -224,6 +243,8 @@ class MaterialReader {
                                        })),
         "have a specular-glossiness map; half of their glossiness sets the highlight of the whole "
         "material");
+    add("gltf.wrap", wrapped_,
+        "ask for clamped or mirrored textures, which are repeated where uvs leave the picture");
     add("gltf.alpha-mask", cut_out_,
         "are cut out at an alpha value: lower values are transparent, the others opaque");
   }
@@ -369,8 +390,17 @@ class MaterialReader {
     return *paths_[index];
   }
 
+  bool repeats(int texture) const {
+    if (texture < 0 || static_cast<std::size_t>(texture) >= gltf_.textures.size()) return true;
+    const int sampler = gltf_.textures[static_cast<std::size_t>(texture)].sampler;
+    if (sampler < 0 || static_cast<std::size_t>(sampler) >= gltf_.samplers.size()) return true;
+    const tinygltf::Sampler& stated = gltf_.samplers[static_cast<std::size_t>(sampler)];
+    return stated.wrapS == TINYGLTF_TEXTURE_WRAP_REPEAT &&
+           stated.wrapT == TINYGLTF_TEXTURE_WRAP_REPEAT;
+  }
+
   /// The image of a texture: its PNG or JPEG, or else its WebP (EXT_texture_webp), or its KTX 2
-  /// file, of which the reader of images says that it is none that it reads.
+  /// file, which the reader of images reports as unsupported.
   static int source_of(const tinygltf::Texture& texture) {
     if (texture.source >= 0) return texture.source;
     for (const char* const name : {"EXT_texture_webp", kBasisTextures}) {
@@ -383,28 +413,27 @@ class MaterialReader {
   }
 
   std::string find_image(const tinygltf::Image& image, std::size_t index) {
-    std::error_code error;
-    for (const std::string& name : {image.uri, percent_decoded(image.uri)}) {
-      if (name.empty() || name.find('\0') != std::string::npos) continue;
-      if (std::filesystem::is_regular_file(folder_ + name, error)) return folder_ + name;
+    const std::string decoded = percent_decoded(image.uri);
+    if (image.image.empty() || !image.uri.starts_with("data:")) {
+      if (std::string found = find_named_file(image.uri, folder_); !found.empty()) {
+        note_place(image.uri, found, folder_, label_, 0, diagnostics_);
+        return found;
+      }
     }
     if (!image.image.empty()) {
       const std::string path = new_picture(plain_name(image.name, "image" + std::to_string(index)) +
-                                           (image.mimeType == "image/jpeg"   ? ".jpg"
-                                            : image.mimeType == "image/webp" ? ".webp"
-                                            : image.mimeType == "image/ktx2" ? ".ktx2"
-                                                                             : ".png"));
+                                           picture_ending(image.image, image.mimeType));
       const auto bytes = std::as_bytes(std::span(image.image));
       if (!folder_of_images_->path().empty() && write_file(path, bytes)) return path;
     }
-    diagnostics_.push_back({"gltf.missing-image", DiagnosticSeverity::kWarning, label_, 0,
-                            "the image '" + image.uri + "' is not there",
-                            "put the image next to the file under that name"});
+    diagnostics_.push_back(not_read("gltf.missing-image", label_, 0,
+                                    "image '" + short_name(image.uri) + "'", decoded, folder_,
+                                    "put the image next to the file under that name"));
     return {};
   }
 
   const tinygltf::Model& gltf_;
-  std::string folder_;
+  const ModelFolder& folder_;
   std::string label_;
   std::vector<Diagnostic>& diagnostics_;
   std::vector<std::optional<std::string>> paths_;
@@ -416,6 +445,7 @@ class MaterialReader {
   int normals_left_out_ = 0;
   int averaged_ = 0;
   int cut_out_ = 0;
+  int wrapped_ = 0;
 };
 
 }  // namespace
@@ -428,33 +458,13 @@ void use_metallic_roughness(tinygltf::Model& gltf) {
   }
 }
 
-std::string percent_decoded(const std::string& uri) {
-  const auto digit = [](char c) {
-    if (c >= '0' && c <= '9') return c - '0';
-    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-    return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
-  };
-  std::string decoded;
-  for (std::size_t i = 0; i < uri.size(); ++i) {
-    const int high = uri[i] == '%' && i + 2 < uri.size() ? digit(uri[i + 1]) : -1;
-    const int low = high >= 0 ? digit(uri[i + 2]) : -1;
-    if (low < 0) {
-      decoded += uri[i];
-      continue;
-    }
-    decoded += static_cast<char>(16 * high + low);
-    i += 2;
-  }
-  return decoded;
-}
-
 bool keep_image_bytes(tinygltf::Image* image, int, std::string*, std::string*, int, int,
                       const unsigned char* bytes, int size, void*) {
   image->image.assign(bytes, bytes + std::max(size, 0));
   return true;
 }
 
-std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const std::string& folder,
+std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const ModelFolder& folder,
                                            const std::string& label,
                                            std::vector<Diagnostic>& diagnostics) {
   MaterialReader reader(gltf, folder, label, diagnostics);

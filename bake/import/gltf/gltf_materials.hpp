@@ -6,7 +6,7 @@
 
 #include <glm/vec2.hpp>
 
-#include "bake/import/source_model.hpp"
+#include "bake/import/read_model.hpp"
 
 namespace tinygltf {
 struct Image;
@@ -15,10 +15,7 @@ class Model;
 
 namespace modar {
 
-/// A URI with %XX as the byte that it stands for (RFC 3986, 2.1); what is no such pair stays.
-std::string percent_decoded(const std::string& uri);
-
-/// Keeps an image's encoded bytes as they are: for tinygltf::TinyGLTF::SetImageLoader().
+/// Keeps an image's encoded bytes unchanged: for tinygltf::TinyGLTF::SetImageLoader().
 bool keep_image_bytes(tinygltf::Image* image, int index, std::string* error, std::string* warning,
                       int width, int height, const unsigned char* bytes, int size, void* user);
 
@@ -28,10 +25,10 @@ void use_metallic_roughness(tinygltf::Model& gltf);
 
 /// One material for each of the file's, followed by clay for primitives without a material:
 /// emission, occlusion, roughness, metalness and the modes of alpha as far as our shader has them.
-/// Findings say what was folded into what, and what was left out.
+/// Findings state merged and omitted parts.
 /// folder: where image names are looked up, with a trailing slash. label: the file's name in
 /// diagnostics.
-std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const std::string& folder,
+std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const ModelFolder& folder,
                                            const std::string& label,
                                            std::vector<Diagnostic>& diagnostics);
 

@@ -1,4 +1,4 @@
-// Decodes view by view, and writes the JSON with the views where they lie then.
+// Decodes view by view, and writes the JSON with the views' new places.
 #include "bake/import/gltf/gltf_meshopt.hpp"
 
 #include <meshoptimizer.h>
@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "bake/import/conversion.hpp"
-#include "bake/import/gltf/gltf_materials.hpp"
+#include "bake/import/name_form.hpp"
 #include "bake/io/input.hpp"
 #include "bake/json.hpp"
 
@@ -43,8 +43,8 @@ std::uint32_t number_at(const std::string& file, std::size_t offset) {
   return number;
 }
 
-/// The JSON of a file, and the binary chunk that a GLB has. What is no GLB by its chunks is left to
-/// the reader, which says so.
+/// The JSON of a file, and the binary chunk that a GLB has. A file that is no GLB by its chunks is
+/// left to the reader, which says so.
 struct Parts {
   std::string json;
   std::string binary;
@@ -108,7 +108,7 @@ EncodedView encoded_view(const Json& extension) {
           count("count"),  text("mode"),        text("filter")};
 }
 
-/// Undoes the filter; false where there is none for such elements.
+/// Undoes the filter; false if none exists for such elements.
 bool undo_filter(const EncodedView& view, std::string& bytes) {
   if (view.filter.empty() || view.filter == "NONE") return true;
   if (view.mode != "ATTRIBUTES") return false;
@@ -176,10 +176,10 @@ std::optional<std::string> decoded(const EncodedView& view, const std::string& b
 
 class Rewriter {
  public:
-  Rewriter(Json json, std::string binary, bool is_glb, std::string folder, std::string label)
+  Rewriter(Json json, std::string binary, bool is_glb, const ModelFolder& folder, std::string label)
       : json_(std::move(json)),
         binary_(std::move(binary)),
-        folder_(std::move(folder)),
+        folder_(folder),
         label_(std::move(label)),
         all_(binary_),
         buffers_(json_.find("buffers").value_or(Json::array())),
@@ -232,8 +232,8 @@ class Rewriter {
     if (bytes) return &*bytes;
     const std::string name = uri->text().value_or("");
     for (const std::string& file : {name, percent_decoded(name)}) {
-      if (bytes || !is_regular_file(folder_ + file)) continue;
-      std::ifstream stream(folder_ + file, std::ios::binary);
+      if (bytes || !folder_.has(folder_.path + file)) continue;
+      std::ifstream stream(folder_.path + file, std::ios::binary);
       if (!stream) continue;
       bytes.emplace(std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>());
     }
@@ -242,7 +242,7 @@ class Rewriter {
   }
 
   /// The file's, and one more: the whole binary chunk. Others without a file begin where it does;
-  /// but for a GLB's own they stood for what has been decoded.
+  /// but for a GLB's own they represented the decoded data.
   [[nodiscard]] Json buffers() const {
     Json result = Json::array();
     for (std::size_t i = 0; i < buffers_.size(); ++i) {
@@ -270,9 +270,9 @@ class Rewriter {
 
   Json json_;
   std::string binary_;  ///< the chunk of a GLB
-  std::string folder_;
+  const ModelFolder& folder_;
   std::string label_;
-  std::string all_;  ///< the same, and what was decoded
+  std::string all_;  ///< the same, and the decoded data
   Json buffers_;
   std::vector<std::optional<std::string>> loaded_;
   bool is_glb_;
@@ -280,7 +280,7 @@ class Rewriter {
 
 }  // namespace
 
-Result<std::string> decode_meshopt_views(std::string file, const std::string& folder,
+Result<std::string> decode_meshopt_views(std::string file, const ModelFolder& folder,
                                          const std::string& label) {
   const auto named = [&](const char* name) { return file.find(name) != std::string::npos; };
   if (std::none_of(kExtensions.begin(), kExtensions.end(), named)) return file;

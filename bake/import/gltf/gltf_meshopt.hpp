@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "bake/import/read_model.hpp"
 #include "formats/base/error.hpp"
 
 namespace modar {
@@ -13,7 +14,7 @@ namespace modar {
 /// Errors: kInvalidInput "gltf.meshopt", which names the buffer view; kUnsupported where the result
 /// is larger than a GLB can be, or the view was encoded by a newer version than the library reads,
 /// with its place and the command that converts the file.
-Result<std::string> decode_meshopt_views(std::string file, const std::string& folder,
+Result<std::string> decode_meshopt_views(std::string file, const ModelFolder& folder,
                                          const std::string& label);
 
 }  // namespace modar

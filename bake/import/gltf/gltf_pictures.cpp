@@ -10,8 +10,7 @@
 namespace modar {
 namespace {
 
-/// glTF's occlusion darkens what comes from all around and not what comes from a lamp; a colour
-/// darkens both. Half of it, as if lamps and surroundings gave as much light.
+/// Share of glTF's occlusion that darkens a colour, which lamps light as well as the surroundings.
 constexpr double kOccludedShare = 0.5;
 
 /// A picture at the size of another, where it has a path.

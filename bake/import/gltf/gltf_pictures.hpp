@@ -33,12 +33,12 @@ struct GltfPictures {
   }
 };
 
-/// One picture of what is drawn, of the size of first(): the colour, darkened by the occlusion,
-/// plus what is emitted, in linear light, with the factors of both where anything is emitted; alpha
-/// as asked. Nothing where the colour can be drawn as it is. Errors: as read_image().
+/// One picture of the drawn colours, of the size of first(): the colour, darkened by the occlusion,
+/// plus the emission, in linear light, with the factors of both where anything is emitted; alpha
+/// as asked. Nothing if the colour can be drawn unchanged. Errors: as read_image().
 Result<std::optional<RgbaImage>> fold_pictures(const GltfPictures& pictures);
 
-/// Means over a picture of green and blue, as they are stored: roughness and metalness, in [0,1].
+/// Means over a picture of stored green and blue: roughness and metalness, in [0,1].
 /// Errors: as read_image().
 struct RoughnessMetalness {
   double roughness = 1;

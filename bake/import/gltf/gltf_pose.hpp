@@ -1,4 +1,4 @@
-// Where the vertices of a glTF file lie: transforms of nodes, joints of skins, copies of nodes.
+// The places of a glTF file's vertices: transforms of nodes, joints of skins, copies of nodes.
 #pragma once
 
 #include <cstddef>

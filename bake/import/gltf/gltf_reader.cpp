@@ -21,6 +21,7 @@
 #include "bake/import/gltf/gltf_pictures.hpp"
 #include "bake/import/gltf/gltf_pose.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
+#include "bake/import/name_form.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/io/input.hpp"
 
@@ -34,8 +35,10 @@ namespace {
 constexpr std::size_t kMostCopied = std::size_t{1} << 25;
 constexpr int kMaxDepth = 1000;  ///< of nodes, which take 0.5 to 0.75 MiB of the stack
 
-/// What is counted while the scene is read, and left out of the model.
+/// Parts counted while the scene is read, and left out of the model.
 struct LeftOut {
+  std::size_t hidden = 0;            ///< nodes
+  std::size_t vertex_alphas = 0;     ///< primitives whose vertices have an opacity
   std::size_t lines_and_points = 0;  ///< primitives
   std::size_t morphs = 0;            ///< primitives with targets
   std::size_t second_uvs = 0;        ///< primitives
@@ -91,12 +94,24 @@ class SceneReader {
     }
     seen_[static_cast<std::size_t>(index)] = true;
     const tinygltf::Node& node = gltf_.nodes[static_cast<std::size_t>(index)];
+    if (is_hidden(node)) {
+      ++left_out_.hidden;
+      return {};
+    }
     const glm::dmat4 to_scene = parent * node_transform(node);
     if (node.mesh >= 0 && static_cast<std::size_t>(node.mesh) < gltf_.meshes.size()) {
       MODAR_TRY(add_mesh(node, to_scene));
     }
     for (const int child : node.children) MODAR_TRY(walk(child, to_scene, depth + 1));
     return {};
+  }
+
+  /// KHR_node_visibility: hides a node and all below it.
+  static bool is_hidden(const tinygltf::Node& node) {
+    const auto found = node.extensions.find("KHR_node_visibility");
+    if (found == node.extensions.end() || !found->second.IsObject()) return false;
+    const tinygltf::Value& visible = found->second.Get("visible");
+    return visible.IsBool() && !visible.Get<bool>();
   }
 
   Result<void> add_mesh(const tinygltf::Node& node, const glm::dmat4& to_scene) {
@@ -107,12 +122,28 @@ class SceneReader {
         return wrong("gltf.copies", "its instanced nodes make more than " +
                                         std::to_string(kMostCopied) + " vertices");
       }
-      for (const auto& primitive : gltf_.meshes[static_cast<std::size_t>(node.mesh)].primitives) {
+      const tinygltf::Mesh& mesh = gltf_.meshes[static_cast<std::size_t>(node.mesh)];
+      weights_ = node.weights.empty() ? mesh.weights : node.weights;
+      for (const auto& primitive : mesh.primitives) {
         MODAR_TRY(add_primitive(primitive, node.skin, to_scene * copy));
       }
     }
     return {};
   }
+
+  /// A morph target with a weight.
+  struct Morph {
+    double weight = 0;
+    bool moves = false;
+    bool turns = false;
+    GltfAccessor positions;
+    GltfAccessor normals;
+
+    void apply(std::size_t v, glm::dvec3& at, glm::dvec3& normal) const {
+      if (moves) at += weight * vector(positions, v);
+      if (turns) normal += weight * vector(normals, v);
+    }
+  };
 
   /// Opens an optional attribute; false if it is present and broken.
   bool open(const tinygltf::Primitive& primitive, const std::string& name, std::size_t count,
@@ -121,6 +152,23 @@ class SceneReader {
     there = found != primitive.attributes.end();
     return !there || (accessor.open(gltf_, found->second) && accessor.size() >= count &&
                       accessor.components() >= least_components);
+  }
+
+  /// The primitive's targets that have a weight.
+  bool open_morphs(const tinygltf::Primitive& primitive, std::size_t count,
+                   std::vector<Morph>& morphs) const {
+    for (std::size_t t = 0; t < std::min(weights_.size(), primitive.targets.size()); ++t) {
+      if (weights_[t] == 0) continue;
+      Morph& morph = morphs.emplace_back();
+      morph.weight = weights_[t];
+      tinygltf::Primitive target;
+      target.attributes = primitive.targets[t];
+      if (!open(target, "POSITION", count, 3, morph.positions, morph.moves) ||
+          !open(target, "NORMAL", count, 3, morph.normals, morph.turns)) {
+        return false;
+      }
+    }
+    return true;
   }
 
   Result<void> add_primitive(const tinygltf::Primitive& primitive, int skin,
@@ -148,6 +196,10 @@ class SceneReader {
       return wrong("gltf.accessor", "an accessor exceeds its buffer or is invalid");
     }
     if (!there) return {};
+    std::vector<Morph> morphs;
+    if (!open_morphs(primitive, positions.size(), morphs)) {
+      return wrong("gltf.accessor", "a morph target exceeds its buffer or is invalid");
+    }
     if (model_.positions.size() + positions.size() >= kNoIndex) {
       return wrong("gltf.read", "it has more vertices than 32 bits count");
     }
@@ -164,18 +216,30 @@ class SceneReader {
           return wrong("gltf.skin", "a vertex refers to a joint that its skin does not have");
         turn = glm::transpose(glm::inverse(glm::dmat3(*place)));
       }
-      model_.positions.push_back(glm::dvec3(*place * glm::dvec4(vector(positions, v), 1.0)));
-      model_.normals.push_back(has_normals ? glm::vec3(turn * vector(normals, v)) : glm::vec3(0));
-      // SourceModel has OBJ's convention: v points up.
-      const glm::dvec2 uv =
-          has_uvs ? placing.apply({uvs.at(v, 0), uvs.at(v, 1)}) : glm::dvec2(0.0, 1.0);
-      model_.uvs.push_back({uv.x, 1.0 - uv.y});
+      glm::dvec3 at = vector(positions, v);
+      glm::dvec3 normal = has_normals ? vector(normals, v) : glm::dvec3(0.0);
+      for (const Morph& morph : morphs) morph.apply(v, at, normal);
+      model_.positions.push_back(glm::dvec3(*place * glm::dvec4(at, 1.0)));
+      model_.normals.push_back(has_normals ? glm::vec3(turn * normal) : glm::vec3(0));
+      model_.uvs.push_back(has_uvs ? uv_up(placing.apply({uvs.at(v, 0), uvs.at(v, 1)}))
+                                   : glm::dvec2(0.0));
       model_.colours.push_back(has_colours ? colour_of(colours, v) : glm::vec3(1.0f));
     }
     any_colours_ = any_colours_ || has_colours;
+    if (has_colours && has_alpha(colours, positions.size())) ++left_out_.vertex_alphas;
     begin_material(primitive.material);
     return add_triangles(primitive, mode, first, positions.size(), mirrored, has_uvs, has_normals);
   }
+
+  static bool has_alpha(const GltfAccessor& colours, std::size_t count) {
+    for (std::size_t v = 0; v < count && colours.components() == 4; ++v) {
+      if (colours.at(v, 3) < 1) return true;
+    }
+    return false;
+  }
+
+  /// As SourceModel has it, in OBJ's convention.
+  static glm::dvec2 uv_up(const glm::dvec2& uv) { return {uv.x, 1.0 - uv.y}; }
 
   static glm::vec3 colour_of(const GltfAccessor& colours, std::size_t v) {
     const glm::dvec3 linear = vector(colours, v);
@@ -256,10 +320,11 @@ class SceneReader {
   SkinPoses skins_;
   std::vector<bool> seen_;  // nodes: glTF's are trees
   bool any_colours_ = false;
+  std::vector<double> weights_;  // of the mesh at hand's morph targets
   LeftOut left_out_;
 };
 
-/// More has no GLB, whose header states its length in 32 bits, and no buffer that fits beside one.
+/// More has no GLB, whose header states its length in 32 bits, and no buffer that fits next to one.
 constexpr std::size_t kMaxFileBytes = 0xFFFFFFFF;
 
 /// Extensions that are read in full.
@@ -267,7 +332,7 @@ constexpr const char* kKnownExtensions[] = {
     "EXT_mesh_gpu_instancing",    "EXT_meshopt_compression", "EXT_texture_webp",
     "KHR_draco_mesh_compression", "KHR_materials_unlit",     "KHR_mesh_quantization",
     "KHR_meshopt_compression",    "KHR_texture_transform",   "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_transmission"};
+    "KHR_materials_transmission", "KHR_node_visibility"};
 
 bool is_known(const std::string& extension) {
   return std::find(std::begin(kKnownExtensions), std::end(kKnownExtensions), extension) !=
@@ -275,7 +340,7 @@ bool is_known(const std::string& extension) {
 }
 
 /// Whether a file that requires an extension can be shown without it: lamps, which the scene's
-/// light stands for, notes, and refinements of the core's materials.
+/// light replaces, notes, and refinements of the core's materials.
 bool is_dispensable(const std::string& extension) {
   constexpr const char* kAlone[] = {
       "KHR_lights_punctual", "EXT_lights_ies", "EXT_lights_image_based",
@@ -318,7 +383,10 @@ void report_left_out(const tinygltf::Model& gltf, const LeftOut& counts, const s
     words += (words.empty() ? "" : ", ") + std::to_string(count) + " " + (count == 1 ? one : many);
   };
   add(gltf.animations.size(), "animation", "animations");
-  add(counts.morphs, "set of morph targets", "sets of morph targets");
+  add(counts.morphs, "set of morph targets (at its default weights)",
+      "sets of morph targets (at their default weights)");
+  add(counts.hidden, "hidden node", "hidden nodes");
+  add(counts.vertex_alphas, "primitive's opacity of vertices", "primitives' opacities of vertices");
   add(counts.second_uvs, "second uv set", "second uv sets");
   add(counts.lines_and_points, "primitive of lines or points", "primitives of lines or points");
   add(gltf.cameras.size(), "camera", "cameras");
@@ -336,12 +404,48 @@ void report_left_out(const tinygltf::Model& gltf, const LeftOut& counts, const s
 
 // How tinygltf reads the files that a model names: regular ones, under the names as they stand.
 
-bool regular_file(const std::string& path, void*) {
-  return is_regular_file(path);
+bool is_readable(const std::string& path, void* folder) {
+  return static_cast<const ModelFolder*>(folder)->has(path);
 }
 
-std::string plain_path(const std::string& path, void*) {
-  return path;
+/// The file that a buffer's path refers to, in the folder or as find_named_file() finds it.
+std::string found_path(const std::string& path, void* user) {
+  const auto& folder = *static_cast<const ModelFolder*>(user);
+  if (folder.has(path) || !path.starts_with(folder.path)) return path;
+  const std::string found = find_named_file(path.substr(folder.path.size()), folder);
+  return found.empty() ? path : found;
+}
+
+/// Calls what a `data:` URI holds plain bytes, whatever the file calls it: the bytes show what they
+/// are, and tinygltf reads few types.
+void call_data_bytes(std::string& json) {
+  constexpr std::string_view kStart = "\"data:";
+  constexpr std::string_view kEnd = ";base64,";
+  constexpr std::size_t kMostType = 256;
+  std::string plain;
+  std::size_t done = 0;
+  for (std::size_t at = json.find(kStart); at != std::string::npos;
+       at = json.find(kStart, at + 1)) {
+    const std::size_t end = json.find(kEnd, at);
+    if (end == std::string::npos) break;
+    const std::size_t type = at + kStart.size();
+    if (end - type > kMostType || json.find('"', type) < end) continue;
+    plain.append(json, done, type - done);
+    plain += "application/octet-stream";
+    done = end;
+  }
+  if (done != 0) json = plain.append(json, done, std::string::npos);
+}
+
+/// Words of a message with each URI short.
+std::string short_words(const std::string& message) {
+  std::string words;
+  for (std::size_t at = 0; at < message.size();) {
+    const std::size_t end = std::min(message.find(' ', at), message.size());
+    words += (words.empty() ? "" : " ") + short_name(message.substr(at, end - at));
+    at = end + 1;
+  }
+  return words;
 }
 
 bool read_buffer(std::vector<unsigned char>* bytes, std::string* error, const std::string& path,
@@ -357,14 +461,16 @@ bool read_buffer(std::vector<unsigned char>* bytes, std::string* error, const st
 
 }  // namespace
 
-Result<SourceModel> read_gltf(const std::string& path) {
+Result<SourceModel> read_gltf(const std::string& path, const ReadOptions& options) {
   MODAR_ASSIGN(std::string bytes, read_file(path, kMaxFileBytes));
   const std::string parent = std::filesystem::path(path).parent_path().string();
-  const std::string folder = (parent.empty() ? "." : parent) + "/";
-  MODAR_ASSIGN(bytes, decode_meshopt_views(std::move(bytes), folder, path));
+  ModelFolder place((parent.empty() ? "." : parent) + "/", options.within);
+  const std::string& folder = place.path;
+  MODAR_ASSIGN(bytes, decode_meshopt_views(std::move(bytes), place, path));
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader(keep_image_bytes, nullptr);
-  loader.SetFsCallbacks({regular_file, plain_path, read_buffer, nullptr, nullptr});
+  if (!bytes.starts_with("glTF")) call_data_bytes(bytes);
+  loader.SetFsCallbacks({is_readable, found_path, read_buffer, nullptr, &place});
   tinygltf::Model gltf;
   std::string error;
   std::string warning;
@@ -383,7 +489,8 @@ Result<SourceModel> read_gltf(const std::string& path) {
   if (!good) {
     std::replace(error.begin(), error.end(), '\n', ' ');
     return fail(
-        ExitCode::kInvalidInput, "gltf.read", path, "it cannot be read as glTF 2.0: " + error,
+        ExitCode::kInvalidInput, "gltf.read", path,
+        "it cannot be read as glTF 2.0: " + short_words(error),
         "put its buffers next to it, or check it with the glTF validator and export it again");
   }
   SourceModel model;
@@ -395,7 +502,7 @@ Result<SourceModel> read_gltf(const std::string& path) {
   for (const tinygltf::Buffer& buffer : gltf.buffers) note_file(buffer.uri);
   for (const tinygltf::Image& image : gltf.images) note_file(image.uri);
   use_metallic_roughness(gltf);
-  model.materials = gltf_materials(gltf, folder, path, model.diagnostics);
+  model.materials = gltf_materials(gltf, place, path, model.diagnostics);
   SceneReader scene(gltf, model, path);
   MODAR_TRY(scene.run());
   report_left_out(gltf, scene.left_out(), path, model.diagnostics);

@@ -35,7 +35,7 @@ std::uint64_t window_bits(const char* p, const Test& test) {
   return bits;
 }
 
-/// The bytes that do not lie in [kLow, '9'].
+/// The bytes that are not in [kLow, '9'].
 template <char kLow, unsigned kFrom, unsigned kTo>
 std::uint64_t bytes_outside(const char* p) {
   const __m128i low = _mm_set1_epi8(kLow);
@@ -52,8 +52,8 @@ std::uint64_t points_in(const char* p) {
 
 /// The places of the lowest kCount bits, which are taken; false where there are fewer.
 template <std::size_t kCount>
-[[gnu::always_inline]] inline bool take_bits(std::uint64_t& bits,
-                                             std::array<unsigned, kCount>& places) {
+[[gnu::always_inline]] inline bool parse_bits(std::uint64_t& bits,
+                                              std::array<unsigned, kCount>& places) {
   std::array<std::uint64_t, kCount> left;
   for (std::uint64_t& each : left) {
     each = bits;
@@ -77,7 +77,7 @@ inline constexpr std::array<std::uint64_t, kMostDigits + 1> kLastBytes = {0,
                                                                           0xFFFFFFFFFFFFFF00u,
                                                                           0xFFFFFFFFFFFFFFFFu};
 
-/// Two times eight bytes, wherever they lie.
+/// Two times eight bytes at any places.
 inline __m128i load_lanes(const void* low, const void* high) {
   double first = 0;
   double second = 0;
@@ -126,17 +126,17 @@ struct Decimal {
   unsigned lead;     ///< of kLeads
 };
 
-/// What a digit adds that stands before eight others.
+/// The value of a digit before eight others.
 inline constexpr std::array<double, 10> kLeads = {0e8, 1e8, 2e8, 3e8, 4e8, 5e8, 6e8, 7e8, 8e8, 9e8};
 
-/// 10 to the power of n at 2 n, its negative at 2 n + 1: dividing by it gives the sign, of 0 too.
+/// Powers of ten, positive and negative: dividing gives the sign, also of 0.
 inline constexpr std::array<double, 18> kDivisors = {1e0, -1e0, 1e1, -1e1, 1e2, -1e2,
                                                      1e3, -1e3, 1e4, -1e4, 1e5, -1e5,
                                                      1e6, -1e6, 1e7, -1e7, 1e8, -1e8};
 
-/// The digits of two decimals without the points; sets bytes of `bad` where they are none.
+/// The digits of two decimals without the points; sets bytes of `bad` where they are not.
 inline __m128i decimal_lanes(const Decimal& low, const Decimal& high, __m128i& bad) {
-  // Those before the point lie one byte farther from the end.
+  // Those before the point are one byte farther from the end.
   const __m128i behind = load_lanes(low.end - kMostDigits, high.end - kMostDigits);
   const __m128i before = load_lanes(low.end - kMostDigits - 1, high.end - kMostDigits - 1);
   const __m128i split = load_lanes(&kLastBytes[low.after], &kLastBytes[high.after]);
@@ -148,7 +148,7 @@ inline __m128i decimal_lanes(const Decimal& low, const Decimal& high, __m128i& b
 }
 
 /// The values of two decimals, whose digits the low half of `numbers` has. Both operands of the
-/// division are exact, so the single rounding is correct (see take_plain_real()).
+/// division are exact, so the single rounding is correct (see parse_plain_real()).
 inline __m128d decimal_pair(__m128i numbers, const Decimal& low, const Decimal& high) {
   const __m128i divisors = load_lanes(&kDivisors[low.divisor], &kDivisors[high.divisor]);
   const __m128i leads = load_lanes(&kLeads[low.lead], &kLeads[high.lead]);
@@ -191,11 +191,11 @@ struct DecimalMarks {
 /// kCount decimals at p, each after one blank but the first. Returns the place of the first
 /// byte after them, 0 for anything else. Reads from kTextPadding bytes ahead of p.
 template <std::size_t kCount>
-[[gnu::always_inline]] inline unsigned take_decimals(const char* p, DecimalMarks& marks,
-                                                     double* values) {
+[[gnu::always_inline]] inline unsigned parse_decimals(const char* p, DecimalMarks& marks,
+                                                      double* values) {
   std::array<unsigned, kCount> ends;
   std::array<unsigned, kCount> points;
-  if (!take_bits(marks.ends, ends) || !take_bits(marks.points, points)) return 0;
+  if (!parse_bits(marks.ends, ends) || !parse_bits(marks.points, points)) return 0;
   std::array<Decimal, kCount> decimals;
   unsigned excess = 0;
   unsigned begin = 0;
@@ -218,7 +218,7 @@ template <std::size_t kCount>
 
 /// Three or six decimals at p, each after one blank but the first. Returns the first byte after
 /// them and their count; nullptr for anything else.
-inline const char* take_three_or_six(const char* p, double* values, unsigned& count) {
+inline const char* parse_three_or_six(const char* p, double* values, unsigned& count) {
   // Three end within 48 bytes.
   DecimalMarks marks = {bytes_outside<'-', 0, 48>(p), points_in<0, 48>(p)};
   const std::uint64_t from_second = marks.ends & (marks.ends - 1);
@@ -227,20 +227,20 @@ inline const char* take_three_or_six(const char* p, double* values, unsigned& co
   unsigned end = 0;
   count = 3;
   if (p[__builtin_ctzll(from_third)] != ' ') {
-    end = take_decimals<3>(p, marks, values);
+    end = parse_decimals<3>(p, marks, values);
   } else {
     count = 6;
     marks.ends |= bytes_outside<'-', 48, 64>(p);
     marks.points |= points_in<48, 64>(p);
-    end = take_decimals<6>(p, marks, values);
+    end = parse_decimals<6>(p, marks, values);
   }
   return end == 0 ? nullptr : p + end;
 }
 
 /// Two decimals at p, with one blank between them.
-inline const char* take_two(const char* p, double* values) {
+inline const char* parse_two(const char* p, double* values) {
   DecimalMarks marks = {bytes_outside<'-', 0, 32>(p), points_in<0, 32>(p)};
-  const unsigned end = take_decimals<2>(p, marks, values);
+  const unsigned end = parse_decimals<2>(p, marks, values);
   return end == 0 ? nullptr : p + end;
 }
 
@@ -271,14 +271,14 @@ template <std::size_t kEach, std::size_t kCount>
   constexpr unsigned kBytes = kCount == 3 ? 32 : kCount == 4 ? 48 : kWindow;
   std::uint64_t others = bytes_outside<'0', 0, kBytes>(p);
   if constexpr (kEach < 3) {
-    return take_bits(others, ends);
+    return parse_bits(others, ends);
   } else {
     std::array<unsigned, 6> two_corners;
     std::array<unsigned, kCount - 6> rest;
-    if (!take_bits(others, two_corners)) return false;
+    if (!parse_bits(others, two_corners)) return false;
     const unsigned begin = two_corners[5] + 1;
     others = bytes_outside < '0', 0, kCount == 9 ? 32 : kWindow > (p + begin);
-    if (!take_bits(others, rest)) return false;
+    if (!parse_bits(others, rest)) return false;
     std::copy(two_corners.begin(), two_corners.end(), ends.begin());
     for (std::size_t i = 0; i < rest.size(); ++i) ends[6 + i] = begin + rest[i];
     return true;

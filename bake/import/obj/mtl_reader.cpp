@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "bake/image/image.hpp"
+#include "bake/import/name_form.hpp"
 #include "bake/import/obj/number_parser.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/import/reflection.hpp"
@@ -27,26 +28,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_file(const fs::path& path) {
-  std::error_code error;
-  return fs::is_regular_file(path, error) && !error;
-}
-
-bool same_but_case(std::string_view a, std::string_view b) {
-  return a.size() == b.size() && ascii_lower(std::string(a)) == ascii_lower(std::string(b));
-}
-
-/// The entry of `folder` named `name` in any case: the exact match if there is one, else the first
-/// in byte order, so that the result does not depend on the file system's order.
+/// The entry of `folder` named `name` in any spelling, see name_form(): the exact match if there is
+/// one, else the first in byte order, so that the result does not depend on the file system's
+/// order.
 fs::path entry_of(const fs::path& folder, const std::string& name) {
   std::error_code error;
   if (name == "." || name == "..") return folder / name;
   if (fs::exists(folder / name, error) && !error) return folder / name;
   std::string best;
+  const std::string wanted = name_form(name);
   fs::directory_iterator it(folder.empty() ? fs::path(".") : folder, error);
   for (; !error && it != fs::directory_iterator(); it.increment(error)) {
     const std::string entry = it->path().filename().string();
-    if (same_but_case(entry, name) && (best.empty() || entry < best)) best = entry;
+    if (name_form(entry) == wanted && (best.empty() || entry < best)) best = entry;
   }
   return best.empty() ? fs::path() : folder / best;
 }
@@ -59,7 +53,26 @@ fs::path any_case(const fs::path& folder, const fs::path& relative) {
     at = entry_of(at, part.string());
     if (at.empty()) return {};
   }
-  return is_file(at) ? at : fs::path();
+  return at;
+}
+
+/// Where a file may be that is not where it was: from the longest tail of its path to its name
+/// alone, in the model's folder; then in folders where programs put textures.
+std::vector<fs::path> near_places(const fs::path& written) {
+  std::vector<fs::path> parts;
+  for (const fs::path& part : written.lexically_normal().relative_path()) {
+    if (part.empty() || part == "." || part == ".." || part.string().ends_with(':')) continue;
+    parts.push_back(part);
+  }
+  std::vector<fs::path> places;
+  if (parts.empty()) return places;
+  constexpr std::size_t kMostParts = 8;
+  for (std::size_t i = parts.size() - std::min(parts.size(), kMostParts); i < parts.size(); ++i) {
+    fs::path& tail = places.emplace_back();
+    for (std::size_t k = i; k < parts.size(); ++k) tail /= parts[k];
+  }
+  for (const char* folder : {"textures", "../textures"}) places.push_back(folder / parts.back());
+  return places;
 }
 
 std::string_view trimmed(std::string_view text) {
@@ -97,7 +110,7 @@ bool is_number(std::string_view token) {
 }
 
 /// Removes the first word of `text` and returns it.
-std::string_view take_word(std::string_view& text) {
+std::string_view parse_word(std::string_view& text) {
   text = trimmed(text);
   const std::size_t end = std::min(text.find_first_of(" \t"), text.size());
   const std::string_view word = text.substr(0, end);
@@ -106,32 +119,36 @@ std::string_view take_word(std::string_view& text) {
 }
 
 /// Skips the options of the MTL specification with their arguments.
-std::string_view without_options(std::string_view text, bool& transformed) {
+std::string_view without_options(std::string_view text, bool& transformed, MapPlace* place) {
   while (true) {
     text = trimmed(text);
     std::string_view rest = text;
-    const std::string_view option = take_word(rest);
+    const std::string_view option = parse_word(rest);
     if (option.size() < 2 || option.front() != '-') return text;
     const std::string_view name = option.substr(1);
     if (name == "o" || name == "s" || name == "t") {
       const double neutral = name == "s" ? 1.0 : 0.0;
       for (int i = 0; i < 3; ++i) {
         std::string_view after = rest;
-        const std::string_view word = take_word(after);
+        const std::string_view word = parse_word(after);
         if (!is_number(word) || after.empty()) break;
         double value = neutral;
         const std::size_t sign = word.front() == '+' ? 1 : 0;
         std::from_chars(word.data() + sign, word.data() + word.size(), value);
-        transformed = transformed || value != neutral;
+        if (place != nullptr && name != "t") {
+          if (i < 2) (name == "s" ? place->scale : place->offset)[i] = value;
+        } else {
+          transformed = transformed || value != neutral;
+        }
         rest = after;
       }
     } else if (name == "mm") {
-      take_word(rest);
-      take_word(rest);
+      parse_word(rest);
+      parse_word(rest);
     } else if (name == "blendu" || name == "blendv" || name == "clamp" || name == "cc" ||
                name == "imfchan" || name == "texres" || name == "bm" || name == "boost" ||
                name == "type") {
-      take_word(rest);
+      parse_word(rest);
     } else {
       return text;
     }
@@ -141,26 +158,46 @@ std::string_view without_options(std::string_view text, bool& transformed) {
 
 }  // namespace
 
-std::string find_named_file(std::string_view name, const std::string& folder) {
-  const fs::path base(folder);
+std::string find_named_file(std::string_view name, const ModelFolder& folder) {
+  const fs::path base(folder.path);
   const fs::path raw(trimmed(name));
   if (raw.empty() || raw.string().find('\0') != std::string::npos) return {};
-  if (is_file(base / raw)) return (base / raw).string();
+  if (folder.has((base / raw).string())) return (base / raw).string();
   const fs::path clean(cleaned(name));
   if (clean.empty()) return {};
-  if (is_file(base / clean)) return (base / clean).lexically_normal().string();
-  if (clean.is_relative()) {
-    if (const fs::path found = any_case(base, clean.lexically_normal()); !found.empty()) {
-      return found.string();
+  if (folder.has((base / clean).string())) return (base / clean).lexically_normal().string();
+  const std::string decoded = percent_decoded(clean.string());
+  for (const fs::path& written : {clean, fs::path(decoded)}) {
+    if (written.string().find('\0') != std::string::npos) continue;
+    if (!written.is_absolute()) {
+      const std::string found = any_case(base, written.lexically_normal()).string();
+      if (folder.has(found)) return found;
+    }
+    for (const fs::path& place : near_places(written)) {
+      const std::string found = any_case(base, place).lexically_normal().string();
+      if (!found.empty() && folder.has(found)) return found;
     }
   }
-  return any_case(base, clean.filename()).string();
+  return {};
 }
 
-std::string find_map_file(std::string_view statement, const std::string& folder, std::string& name,
-                          bool& transformed) {
+void note_place(const std::string& name, const std::string& path, const ModelFolder& folder,
+                const std::string& label, std::uint64_t line,
+                std::vector<Diagnostic>& diagnostics) {
+  const fs::path base = fs::path(folder.path).lexically_normal();
+  const fs::path found = fs::path(path).lexically_normal();
+  const fs::path wanted = (base / percent_decoded(cleaned(name))).lexically_normal();
+  if (name_form(wanted.string()) == name_form(found.string())) return;
+  const fs::path relative = found.lexically_relative(base);
+  diagnostics.push_back({"model.found-elsewhere", DiagnosticSeverity::kInfo, label, line,
+                         "'" + short_name(name) + "' is read from '" + relative.string() + "'",
+                         ""});
+}
+
+std::string find_map_file(std::string_view statement, const ModelFolder& folder, std::string& name,
+                          bool& transformed, MapPlace* place) {
   transformed = false;
-  std::string_view rest = without_options(statement, transformed);
+  std::string_view rest = without_options(statement, transformed, place);
   name = std::string(rest);
   if (std::string found = find_named_file(rest, folder); !found.empty()) return found;
   // Options after the name, then unknown options before it.
@@ -174,7 +211,7 @@ std::string find_map_file(std::string_view statement, const std::string& folder,
   }
   if (rest.empty() || rest.front() != '-') return {};
   for (int words = 0; words < 32 && !rest.empty(); ++words) {
-    take_word(rest);
+    parse_word(rest);
     if (std::string found = find_named_file(rest, folder); !found.empty()) {
       name = std::string(rest);
       return found;
@@ -187,7 +224,7 @@ namespace {
 // MTL text to materials.
 
 /// One statement with its continued lines joined; advances `at` to the next.
-std::string take_statement(std::string_view text, std::size_t& at, std::uint64_t& line) {
+std::string parse_statement(std::string_view text, std::size_t& at, std::uint64_t& line) {
   std::string statement;
   while (at < text.size()) {
     const char c = text[at++];
@@ -206,7 +243,7 @@ std::string take_statement(std::string_view text, std::size_t& at, std::uint64_t
 }
 
 /// Up to three finite numbers at the front of `text`.
-int take_numbers(std::string_view text, std::array<float, 3>& values) {
+int parse_numbers(std::string_view text, std::array<float, 3>& values) {
   std::string padded(text);
   padded.append(kTextPadding, '\0');
   const char* p = padded.data();
@@ -217,41 +254,45 @@ int take_numbers(std::string_view text, std::array<float, 3>& values) {
     if (p >= end) break;
     double value = 0;
     NumberKind kind = NumberKind::kNone;
-    p = take_real(p, end, value, kind);
+    p = parse_real(p, end, value, kind);
     if (kind != NumberKind::kFinite) break;
     values[static_cast<std::size_t>(count++)] = static_cast<float>(std::clamp(value, -1e6, 1e6));
   }
   return count;
 }
 
-/// A colour of three numbers, or of one that stands for all three.
-void take_colour(std::string_view text, glm::vec3& colour) {
+/// A colour of three numbers, or of one for all three.
+void parse_colour(std::string_view text, glm::vec3& colour) {
   std::array<float, 3> v{};
-  const int n = take_numbers(text, v);
+  const int n = parse_numbers(text, v);
   if (n == 3) colour = {v[0], v[1], v[2]};
   if (n == 1) colour = glm::vec3(v[0]);
 }
 
 struct MtlContext {
-  const std::string& folder;
+  const ModelFolder& folder;
   const std::string& label;
   std::vector<Diagnostic>& diagnostics;
   std::vector<std::string>* missing = nullptr;
   std::uint64_t line = 1;
 };
 
-void take_map(std::string_view text, MtlContext& context, std::string& path) {
+void parse_map(std::string_view text, MtlContext& context, std::string& path,
+               MapPlace* place = nullptr) {
   std::string name;
   bool transformed = false;
-  path = find_map_file(text, context.folder, name, transformed);
+  path = find_map_file(text, context.folder, name, transformed, place);
   if (path.empty()) {
     if (context.missing != nullptr) {
-      context.missing->push_back((fs::path(context.folder) / name).string());
+      context.missing->push_back((fs::path(context.folder.path) / name).string());
     }
-    context.diagnostics.push_back({"mtl.missing-map", DiagnosticSeverity::kWarning, context.label,
-                                   context.line, "texture '" + name + "' was not found",
-                                   "put the image next to the MTL file, or correct its name"});
-  } else if (transformed) {
+    context.diagnostics.push_back(
+        not_read("mtl.missing-map", context.label, context.line, "texture '" + name + "'", name,
+                 context.folder, "put the image next to the MTL file, or correct its name"));
+    return;
+  }
+  note_place(name, path, context.folder, context.label, context.line, context.diagnostics);
+  if (transformed) {
     context.diagnostics.push_back({"mtl.map-transform", DiagnosticSeverity::kWarning, context.label,
                                    context.line,
                                    "options that shift or scale the texture are ignored",
@@ -261,7 +302,7 @@ void take_map(std::string_view text, MtlContext& context, std::string& path) {
 
 /// Opacity from `d` or 1 - `Tr`. Exporters disagree on Tr, and none of them means an invisible
 /// part.
-void take_opacity(float opacity, MtlContext& context, SourceMaterial& material) {
+void parse_opacity(float opacity, MtlContext& context, SourceMaterial& material) {
   if (opacity <= 0.0f) {
     context.diagnostics.push_back(
         {"mtl.invisible", DiagnosticSeverity::kInfo, context.label, context.line,
@@ -282,9 +323,33 @@ struct MtlStatements {
   float roughness = 1.0f;
   float metalness = 0.0f;
   float illum = 2.0f;
+  std::string ambient_map;
+  std::string emission_map;
+  MapPlace other_place;  // of these two
 
-  void finish(SourceMaterial& m) const {
-    if (!has_kd && !m.diffuse_map.empty()) m.diffuse = glm::vec3(1.0f);
+  /// Exporters write a map of ambient or emitted light alone where they mean the colour, and a gray
+  /// Kd next to a map that their programs do not multiply: Maya 0, Meshroom 0.6, Blender 0.8.
+  void finish(MtlContext& context, SourceMaterial& m) const {
+    const auto note = [&](const char* id, const char* what, const char* cure) {
+      context.diagnostics.push_back({id, DiagnosticSeverity::kInfo, context.label, 0,
+                                     "material '" + m.name + "' " + what, cure});
+    };
+    if (!emission_map.empty() && !m.diffuse_map.empty()) {
+      note("mtl.emission-map", "has a map of emitted light, which is left out", "");
+    }
+    for (const std::string& map : {ambient_map, emission_map}) {
+      if (!m.diffuse_map.empty() || map.empty()) continue;
+      m.diffuse_map = map;
+      m.place = other_place;
+    }
+    if (!m.alpha_map.empty() && m.alpha_map != m.diffuse_map) {
+      note("mtl.opacity-map", "has a map of opacity of its own, which is left out",
+           "put it into the alpha channel of the picture that map_Kd names");
+    }
+    const glm::vec3 kd = m.diffuse;
+    const bool gray = std::max({kd.r, kd.g, kd.b}) - std::min({kd.r, kd.g, kd.b}) <= 0.01f;
+    if ((gray || !has_kd) && !m.diffuse_map.empty()) m.diffuse = glm::vec3(1.0f);
+    if (m.diffuse_map == emission_map && !emission_map.empty()) m.emission = glm::vec3(0.0f);
     const auto light = [](const glm::vec3& stored) {
       glm::dvec3 linear(0.0);
       for (int i = 0; i < 3; ++i) linear[i] = linear_of_srgb(static_cast<double>(stored[i]));
@@ -309,43 +374,45 @@ struct MtlStatements {
 float bump_factor(std::string_view text) {
   const std::size_t at = text.find("-bm ");
   std::array<float, 3> values{};
-  return at != std::string_view::npos && take_numbers(text.substr(at + 4), values) > 0 ? values[0]
-                                                                                       : 1.0f;
+  return at != std::string_view::npos && parse_numbers(text.substr(at + 4), values) > 0 ? values[0]
+                                                                                        : 1.0f;
 }
 
-void take_property(std::string_view key, std::string_view text, MtlContext& context,
-                   MtlStatements& stated, SourceMaterial& material) {
+void parse_property(std::string_view key, std::string_view text, MtlContext& context,
+                    MtlStatements& stated, SourceMaterial& material) {
   std::array<float, 3> v{};
-  if (key == "ka") take_colour(text, material.ambient);
+  if (key == "ka") parse_colour(text, material.ambient);
   if (key == "kd") {
-    take_colour(text, material.diffuse);
+    parse_colour(text, material.diffuse);
     stated.has_kd = true;
   }
-  if (key == "ks") take_colour(text, material.specular);
-  if (key == "ke") take_colour(text, material.emission);
-  if (key == "ns" && take_numbers(text, v) > 0) material.shininess = std::max(v[0], 0.0f);
-  if (key == "illum" && take_numbers(text, v) > 0) stated.illum = v[0];
-  if ((key == "pr" || key == "pm") && take_numbers(text, v) > 0) {
+  if (key == "ks") parse_colour(text, material.specular);
+  if (key == "ke") parse_colour(text, material.emission);
+  if (key == "ns" && parse_numbers(text, v) > 0) material.shininess = std::max(v[0], 0.0f);
+  if (key == "illum" && parse_numbers(text, v) > 0) stated.illum = v[0];
+  if ((key == "pr" || key == "pm") && parse_numbers(text, v) > 0) {
     (key == "pr" ? stated.roughness : stated.metalness) = v[0];
     stated.physical = true;
   }
   if (key == "d") {
     if (text.starts_with("-halo")) text.remove_prefix(5);
-    if (take_numbers(text, v) > 0) {
-      take_opacity(v[0], context, material);
+    if (parse_numbers(text, v) > 0) {
+      parse_opacity(v[0], context, material);
       stated.has_d = true;
     }
   }
   // d is unambiguous, so it wins wherever it stands.
-  if (key == "tr" && !stated.has_d && take_numbers(text, v) > 0) {
-    take_opacity(1.0f - v[0], context, material);
+  if (key == "tr" && !stated.has_d && parse_numbers(text, v) > 0) {
+    parse_opacity(1.0f - v[0], context, material);
   }
-  if (key == "map_kd") take_map(text, context, material.diffuse_map);
-  if (key == "map_d") take_map(text, context, material.alpha_map);
+  if (key == "map_kd") parse_map(text, context, material.diffuse_map, &material.place);
+  if (key == "map_d") parse_map(text, context, material.alpha_map);
+  if (key == "map_ka") parse_map(text, context, stated.ambient_map, &stated.other_place);
+  if (key == "map_ke") parse_map(text, context, stated.emission_map, &stated.other_place);
   // Many name a normal map by the words for heights; `norm` is one for sure.
   const bool bump = key == "bump" || key == "map_bump";
   if (key == "norm" || key == "map_norm" || (bump && material.normal.path.empty())) {
-    take_map(text, context, material.normal.path);
+    parse_map(text, context, material.normal.path);
     material.normal.may_be_heights = bump;
     material.normal.scale = bump_factor(text);
   }
@@ -353,34 +420,39 @@ void take_property(std::string_view key, std::string_view text, MtlContext& cont
 
 }  // namespace
 
-std::vector<SourceMaterial> parse_mtl(std::string_view text, const std::string& folder,
+std::vector<SourceMaterial> parse_mtl(std::string_view text, const ModelFolder& folder,
                                       const std::string& label,
                                       std::vector<Diagnostic>& diagnostics,
                                       std::vector<std::string>* missing) {
   std::vector<SourceMaterial> materials;
   MtlContext context{folder, label, diagnostics, missing};
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
+    diagnostics.push_back({"mtl.utf16", DiagnosticSeverity::kWarning, label, 0,
+                           "the file is UTF-16 text and is not read", "save it as UTF-8"});
+    return materials;
+  }
   MtlStatements stated;
   std::size_t at = 0;
   std::uint64_t next_line = 1;
   while (at < text.size()) {
     context.line = next_line;
-    const std::string statement = take_statement(text, at, next_line);
+    const std::string statement = parse_statement(text, at, next_line);
     const std::size_t key_end = std::min(statement.find_first_of(" \t"), statement.size());
     std::string key = statement.substr(0, key_end);
     for (char& c : key) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
     std::string_view value = std::string_view(statement).substr(key_end);
     while (!value.empty() && is_blank(value.front())) value.remove_prefix(1);
     if (key == "newmtl") {
-      if (!materials.empty()) stated.finish(materials.back());
+      if (!materials.empty()) stated.finish(context, materials.back());
       stated = {};
       materials.emplace_back();
       materials.back().name = std::string(value);
     } else if (!materials.empty()) {
-      take_property(key, value, context, stated, materials.back());
+      parse_property(key, value, context, stated, materials.back());
     }
   }
-  if (!materials.empty()) stated.finish(materials.back());
+  if (!materials.empty()) stated.finish(context, materials.back());
   return materials;
 }
 namespace {
@@ -422,8 +494,8 @@ std::optional<glm::vec3> mean_colour(const std::string& path) {
 /// SketchUp writes the mean of a texture as its material's colour, and does not mean it to be
 /// multiplied: the product is nearly black.
 void forget_mean_colours(const std::string& label, SourceModel& model) {
-  // The mean of a smaller copy, written with some digits. Of 848 textured materials of Sweet Home
-  // 3D's furniture, which Blender wrote, 1 is as near by chance.
+  // Distance from a picture's mean below which a colour is that mean, written with few digits.
+  // Higher takes chosen colours for means.
   constexpr float kNear = 2.0f / 255.0f;
   std::map<std::string, std::optional<glm::vec3>> means;
   int count = 0;
@@ -444,6 +516,36 @@ void forget_mean_colours(const std::string& label, SourceModel& model) {
        std::to_string(count) + " materials have the mean of their texture as their colour (Kd), "
                                "which is not multiplied",
        ""});
+}
+
+/// Gives the corners of materials whose maps are scaled or shifted uvs of their own.
+void place_maps(SourceModel& model) {
+  const auto moved = [](const SourceMaterial& m) { return m.place != MapPlace(); };
+  if (model.uvs.empty() || std::ranges::none_of(model.materials, moved)) return;
+  if (model.corner_uvs.kind != IndexPlane::Kind::kOwn) {
+    const bool same = model.corner_uvs.kind == IndexPlane::Kind::kSame;
+    if (!same) return;
+    model.corner_uvs.own = model.corner_positions;
+    model.corner_uvs.kind = IndexPlane::Kind::kOwn;
+  }
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> placed;  // by material and uv
+  RunCursor materials(model.material_runs);
+  for (std::size_t f = 0; f < model.face_count(); ++f) {
+    const std::uint32_t number = materials.at(f);
+    const MapPlace& place = model.materials[number].place;
+    if (place == MapPlace()) continue;
+    const std::size_t first = model.face_first(f);
+    for (std::size_t c = first; c < first + model.face_size(f); ++c) {
+      std::uint32_t& uv = model.corner_uvs.own[c];
+      if (uv == kNoIndex) continue;
+      const auto [found, added] = placed.try_emplace({number, uv}, 0);
+      if (added) {
+        found->second = static_cast<std::uint32_t>(model.uvs.size());
+        model.uvs.push_back(model.uvs[uv] * place.scale + place.offset);
+      }
+      uv = found->second;
+    }
+  }
 }
 
 std::string folder_of(const std::string& path) {
@@ -476,20 +578,20 @@ void ObjMaterials::add_library(const std::string& text, std::uint64_t line) {
   libraries_.push_back({text, line});
 }
 
-void ObjMaterials::resolve(const std::string& folder, const std::string& label, bool own_picture,
+void ObjMaterials::resolve(const ModelFolder& folder, const std::string& label, bool own_picture,
                            SourceModel& model) {
   std::vector<Diagnostic>& diagnostics = model.diagnostics;
   std::vector<SourceMaterial>& materials = model.materials;
   materials.resize(used_.size());
   for (std::size_t i = 0; i < used_.size(); ++i) materials[i].name = used_[i].name;
-  if (folder.empty()) return;
+  if (folder.path.empty()) return;
 
   std::vector<std::string> paths;
   const auto missing = [&](const std::string& name, std::uint64_t line) {
-    model.files.push_back((fs::path(folder) / name).string());
-    diagnostics.push_back({"obj.missing-mtl", DiagnosticSeverity::kWarning, label, line,
-                           "material file '" + name + "' was not found",
-                           "put it next to the OBJ file, or correct the mtllib line"});
+    model.files.push_back((fs::path(folder.path) / name).string());
+    diagnostics.push_back(not_read("obj.missing-mtl", label, line, "material file '" + name + "'",
+                                   name, folder,
+                                   "put it next to the OBJ file, or correct the mtllib line"));
   };
   for (const Named& library : libraries_) {
     if (std::string whole = find_named_file(library.name, folder); !whole.empty()) {
@@ -512,12 +614,12 @@ void ObjMaterials::resolve(const std::string& folder, const std::string& label, 
                              "name it in an mtllib line"});
       paths.push_back(std::move(beside));
     } else {
-      model.files.push_back((fs::path(folder) / (model.name + ".mtl")).string());
+      model.files.push_back((fs::path(folder.path) / (model.name + ".mtl")).string());
     }
   }
 
   if (paths.empty()) {
-    take_texture_by_name(folder, label, own_picture, model);
+    assign_texture_by_name(folder, label, own_picture, model);
     if (!materials[0].diffuse_map.empty()) return;
   }
 
@@ -527,9 +629,17 @@ void ObjMaterials::resolve(const std::string& folder, const std::string& label, 
     if (std::find(read.begin(), read.end(), path) != read.end()) continue;
     read.push_back(path);
     model.files.push_back(path);
-    for (SourceMaterial& m : parse_mtl(read_file(path, kMaxMtlBytes).value_or(""), folder_of(path),
-                                       name_of(path), diagnostics, &model.files)) {
+    for (SourceMaterial& m :
+         parse_mtl(read_file(path, kMaxMtlBytes).value_or(""), {folder_of(path), folder.within},
+                   name_of(path), diagnostics, &model.files)) {
       std::string name = m.name;
+      if (used_.size() == 1 && defined.empty()) {
+        materials[0] = m;
+        diagnostics.push_back({"obj.no-usemtl", DiagnosticSeverity::kInfo, label, 0,
+                               "no face names a material; the first one of '" + name_of(path) +
+                                   "', '" + name + "', is used",
+                               ""});
+      }
       defined.try_emplace(std::move(name), std::move(m));
     }
   }
@@ -543,6 +653,7 @@ void ObjMaterials::resolve(const std::string& folder, const std::string& label, 
     }
   }
   forget_mean_colours(label, model);
+  place_maps(model);
 }
 
 }  // namespace modar

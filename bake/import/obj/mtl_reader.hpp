@@ -7,15 +7,20 @@
 #include <string_view>
 #include <vector>
 
-#include "bake/import/source_model.hpp"
+#include "bake/import/read_model.hpp"
 
 namespace modar {
 
 /// The file of a texture statement of an MTL: options before and after the name are ignored.
 /// statement: all after the keyword. name: the part taken for the name, found or not.
-/// transformed: the options scale, shift or disturb the uv.
-std::string find_map_file(std::string_view statement, const std::string& folder, std::string& name,
-                          bool& transformed);
+/// transformed: options disturb the uv (-t) or, without `place`, scale or shift it. place: receives
+/// -s and -o.
+std::string find_map_file(std::string_view statement, const ModelFolder& folder, std::string& name,
+                          bool& transformed, MapPlace* place = nullptr);
+
+/// Notes where a file was found that is not where its name says. path: as find_named_file() found.
+void note_place(const std::string& name, const std::string& path, const ModelFolder& folder,
+                const std::string& label, std::uint64_t line, std::vector<Diagnostic>& diagnostics);
 
 /// Gathers usemtl and mtllib statements in file order, then resolves them.
 class ObjMaterials {
@@ -24,10 +29,10 @@ class ObjMaterials {
   /// Number of the material of that name (0: the default one, made for faces without a material).
   std::uint32_t use(const std::string& name, std::uint64_t line);
   void add_library(const std::string& text, std::uint64_t line);
-  /// Reads the MTL files and fills in what they say of the materials in use; what is missing
-  /// becomes a diagnostic. folder: empty where nothing may be read. own_picture: as in ReadOptions.
-  /// model: has its name; receives materials, diagnostics and files.
-  void resolve(const std::string& folder, const std::string& label, bool own_picture,
+  /// Reads the MTL files and fills in what they say of the materials in use; missing parts become a
+  /// diagnostic. own_picture: as in ReadOptions. model: has its name; receives materials,
+  /// diagnostics and files.
+  void resolve(const ModelFolder& folder, const std::string& label, bool own_picture,
                SourceModel& model);
 
  private:

@@ -1,8 +1,10 @@
 // The slow path of the number parser: long mantissas, exponents, nan and inf.
 #include "bake/import/obj/number_parser.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include <fast_float/fast_float.h>
 
@@ -20,7 +22,7 @@ std::size_t match_word(const char* p, const char* end, const char* word) {
 
 }  // namespace
 
-const char* take_real_slow(const char* p, const char* end, double& value, NumberKind& kind) {
+const char* parse_real_slow(const char* p, const char* end, double& value, NumberKind& kind) {
   const char* const start = p;
   const bool negative = p < end && *p == '-';
   if (p < end && (*p == '-' || *p == '+')) ++p;
@@ -29,7 +31,16 @@ const char* take_real_slow(const char* p, const char* end, double& value, Number
   };
   if (starts_number(p)) {
     double magnitude = 0;
-    const auto result = fast_float::from_chars(p, end, magnitude);
+    auto result = fast_float::from_chars(p, end, magnitude);
+    if (result.ptr + 1 < end && *result.ptr == ',' && is_digit(result.ptr[1])) {
+      std::string pointed(p,
+                          std::min<std::size_t>(static_cast<std::size_t>(end - p), kTextPadding));
+      pointed[static_cast<std::size_t>(result.ptr - p)] = '.';
+      const auto again =
+          fast_float::from_chars(pointed.data(), pointed.data() + pointed.size(), magnitude);
+      result.ptr = p + (again.ptr - pointed.data());
+      result.ec = again.ec;
+    }
     if (result.ec == std::errc() || result.ec == std::errc::result_out_of_range) {
       value = negative ? -magnitude : magnitude;
       kind = std::isfinite(value) ? NumberKind::kFinite : NumberKind::kNotFinite;

@@ -29,7 +29,7 @@ constexpr bool is_digit(char c) {
 /// least this many readable bytes.
 inline constexpr std::size_t kTextPadding = 128;
 
-/// What was found where a number was expected.
+/// The text where a number was expected.
 enum class NumberKind : std::uint8_t { kFinite, kNotFinite, kNone };
 
 namespace detail {
@@ -63,7 +63,7 @@ inline std::uint64_t digits_value(std::uint64_t bytes, unsigned count) {
 
 /// Appends the digits at p to `value` and their number to `count`; returns the first byte after
 /// them. Wraps beyond 19 digits: the caller looks at `count`.
-inline const char* take_digits(const char* p, std::uint64_t& value, unsigned& count) {
+inline const char* parse_digits(const char* p, std::uint64_t& value, unsigned& count) {
   static_assert(std::endian::native == std::endian::little);
   while (true) {
     std::uint64_t bytes = 0;
@@ -77,8 +77,8 @@ inline const char* take_digits(const char* p, std::uint64_t& value, unsigned& co
   }
 }
 
-/// The slow path, for whatever take_real() does not handle itself. `p` is the start of the token.
-const char* take_real_slow(const char* p, const char* end, double& value, NumberKind& kind);
+/// The slow path, for whatever parse_real() does not handle itself. `p` is the start of the token.
+const char* parse_real_slow(const char* p, const char* end, double& value, NumberKind& kind);
 
 /// Applies a sign without a branch, which random signs would mispredict.
 inline double with_sign(double magnitude, bool negative) {
@@ -90,7 +90,7 @@ inline double with_sign(double magnitude, bool negative) {
 /// "-12.345678" at p: a minus or none, digits, a point, digits, 1 to 8 of each, 16 bytes with what
 /// ends it. One look at the bytes finds both ends, so parsing the next number need not wait for the
 /// digits of this one. Returns the first byte after it; nullptr for anything else.
-inline const char* take_short_real(const char* p, double& value) {
+inline const char* parse_short_real(const char* p, double& value) {
   const __m128i bytes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(p));
   // As signed bytes, '0' to '9' are the ten greatest once '9' is moved up to 127.
   const __m128i moved = _mm_add_epi8(bytes, _mm_set1_epi8(127 - '9'));
@@ -122,19 +122,20 @@ inline const char* take_short_real(const char* p, double& value) {
 
 /// The number at p if it is as plain as nearly all are: sign, digits, point, digits, at most 19 of
 /// them, no exponent. Returns the first byte after it; nullptr for anything else.
-inline const char* take_plain_real(const char* p, double& value) {
+inline const char* parse_plain_real(const char* p, double& value) {
 #ifdef __SSE2__
-  if (const char* const end = detail::take_short_real(p, value)) return end;
+  if (const char* const end = detail::parse_short_real(p, value)) return end;
 #endif
   const bool negative = *p == '-';
   p += static_cast<int>(negative || *p == '+');
   std::uint64_t mantissa = 0;
   unsigned digits = 0;
-  p = detail::take_digits(p, mantissa, digits);
+  p = detail::parse_digits(p, mantissa, digits);
   unsigned fraction = 0;
-  if (*p == '.') {
+  // A comma between digits is the point of programs that follow a locale: no list has commas.
+  if (*p == '.' || (*p == ',' && digits != 0 && is_digit(p[1]))) {
     const unsigned before = digits;
-    p = detail::take_digits(p + 1, mantissa, digits);
+    p = detail::parse_digits(p + 1, mantissa, digits);
     fraction = digits - before;
   }
   // Both operands are exact, so the single rounding is correct (Clinger, "How to read floating
@@ -145,12 +146,12 @@ inline const char* take_plain_real(const char* p, double& value) {
   return p;
 }
 
-/// Reads a decimal number at p, correctly rounded in any locale. Accepts a leading '+', ".5",
-/// "2.", exponents, "nan" and "inf" in any case. Returns the first byte after it (p where there is
-/// none). end: end of the text, padding excluded.
-inline const char* take_real(const char* p, const char* end, double& value, NumberKind& kind) {
-  const char* const plain = take_plain_real(p, value);
-  if (plain == nullptr) return detail::take_real_slow(p, end, value, kind);
+/// Reads a decimal number at p, correctly rounded in any locale. Accepts a leading '+', ".5", "2.",
+/// exponents, "nan" and "inf" in any case. Returns the first byte after it (p if none). end: end of
+/// the text, padding excluded.
+inline const char* parse_real(const char* p, const char* end, double& value, NumberKind& kind) {
+  const char* const plain = parse_plain_real(p, value);
+  if (plain == nullptr) return detail::parse_real_slow(p, end, value, kind);
   kind = NumberKind::kFinite;
   return plain;
 }

@@ -53,7 +53,7 @@ void pop_corners(ObjBlock& block, std::uint32_t count) {
 }
 
 /// One past the line end at p; nullptr where the line continues.
-const char* take_line_end(const char* p) {
+const char* parse_line_end(const char* p) {
   // Branches, which a file's lines all take alike: the next line need not wait for this byte.
   if (*p == '\n') return p + 1;
   return *p == '\r' && p[1] == '\n' ? p + 2 : nullptr;
@@ -62,41 +62,41 @@ const char* take_line_end(const char* p) {
 /// Plain numbers, each after one blank, up to the end of the line. Returns the byte after them and
 /// their count; nullptr for anything else, or for more than kMost.
 template <unsigned kMost>
-const char* take_plain_reals(const char* p, double (&values)[kMost], unsigned& count) {
+const char* parse_plain_reals(const char* p, double (&values)[kMost], unsigned& count) {
   count = 0;
   while (*p == ' ') {
     if (count == kMost) return nullptr;
-    p = take_plain_real(p + 1, values[count]);
+    p = parse_plain_real(p + 1, values[count]);
     if (p == nullptr) return nullptr;
     ++count;
   }
   return p;
 }
 
-/// As take_plain_reals(): the three numbers of a position or a normal, or six with a colour.
-const char* take_triples(const char* p, double (&values)[6], unsigned& count) {
+/// As parse_plain_reals(): the three numbers of a position or a normal, or six with a colour.
+const char* parse_triples(const char* p, double (&values)[6], unsigned& count) {
 #ifdef __SSE2__
   if (*p == ' ') {
-    if (const char* const end = detail::take_three_or_six(p + 1, values, count)) return end;
+    if (const char* const end = detail::parse_three_or_six(p + 1, values, count)) return end;
   }
 #endif
-  return take_plain_reals(p, values, count);
+  return parse_plain_reals(p, values, count);
 }
 
-/// As take_plain_reals(): the two or three numbers of a uv.
-const char* take_pair(const char* p, double (&values)[3], unsigned& count) {
+/// As parse_plain_reals(): the two or three numbers of a uv.
+const char* parse_pair(const char* p, double (&values)[3], unsigned& count) {
 #ifdef __SSE2__
   if (*p == ' ') {
     count = 2;
-    const char* const end = detail::take_two(p + 1, values);
+    const char* const end = detail::parse_two(p + 1, values);
     if (end != nullptr && *end != ' ') return end;
   }
 #endif
-  return take_plain_reals(p, values, count);
+  return parse_plain_reals(p, values, count);
 }
 
-/// An index of 1 to 8 digits, not 0; nullptr where there is none.
-const char* take_plain_index(const char* p, std::uint32_t& value) {
+/// An index of 1 to 8 digits, not 0; nullptr if none.
+const char* parse_plain_index(const char* p, std::uint32_t& value) {
   std::uint64_t bytes = 0;
   std::memcpy(&bytes, p, sizeof bytes);
   const unsigned n = count_digits(bytes);
@@ -105,11 +105,11 @@ const char* take_plain_index(const char* p, std::uint32_t& value) {
   return value == 0 ? nullptr : p + n;
 }
 
-const char* take_plain_position(const char* p, ObjBlock& block) {
+const char* parse_plain_position(const char* p, ObjBlock& block) {
   double v[6];
   unsigned n = 0;
-  p = take_triples(p, v, n);
-  if (p != nullptr) p = take_line_end(p);
+  p = parse_triples(p, v, n);
+  if (p != nullptr) p = parse_line_end(p);
   if (p == nullptr || (n == 3 && block.colours.size() != 0) || (n != 3 && n != 6)) return nullptr;
   block.positions.push({v[0], v[1], v[2]});
   if (n == 6) {
@@ -119,21 +119,21 @@ const char* take_plain_position(const char* p, ObjBlock& block) {
   return p;
 }
 
-const char* take_plain_uv(const char* p, ObjBlock& block) {
+const char* parse_plain_uv(const char* p, ObjBlock& block) {
   double v[3];
   unsigned n = 0;
-  p = take_pair(p, v, n);
-  if (p != nullptr) p = take_line_end(p);
+  p = parse_pair(p, v, n);
+  if (p != nullptr) p = parse_line_end(p);
   if (p == nullptr || n < 2) return nullptr;
   block.uvs.push({v[0], v[1]});
   return p;
 }
 
-const char* take_plain_normal(const char* p, ObjBlock& block) {
+const char* parse_plain_normal(const char* p, ObjBlock& block) {
   double v[6];
   unsigned n = 0;
-  p = take_triples(p, v, n);
-  if (p != nullptr) p = take_line_end(p);
+  p = parse_triples(p, v, n);
+  if (p != nullptr) p = parse_line_end(p);
   if (p == nullptr || n != 3) return nullptr;
   block.normals.push(glm::vec3(glm::dvec3(v[0], v[1], v[2])));
   return p;
@@ -146,7 +146,7 @@ struct IndexText {
   std::uint32_t value = 0;
 };
 
-const char* take_first_index(const char* p, IndexText& index) {
+const char* parse_first_index(const char* p, IndexText& index) {
   std::memcpy(&index.bytes, p, sizeof index.bytes);
   index.digits = count_digits(index.bytes);
   if (index.digits == 0) return nullptr;
@@ -155,7 +155,7 @@ const char* take_first_index(const char* p, IndexText& index) {
 }
 
 /// An index that mostly repeats the first one of its corner: then no digits need counting.
-const char* take_next_index(const char* p, const IndexText& first, std::uint32_t& value) {
+const char* parse_next_index(const char* p, const IndexText& first, std::uint32_t& value) {
   std::uint64_t bytes = 0;
   std::memcpy(&bytes, p, sizeof bytes);
   const unsigned bits = 8 * first.digits;
@@ -164,25 +164,25 @@ const char* take_next_index(const char* p, const IndexText& first, std::uint32_t
     value = first.value;
     return p + first.digits;
   }
-  return take_plain_index(p, value);
+  return parse_plain_index(p, value);
 }
 
 /// One corner "v", "v/t", "v//n" or "v/t/n" of positive indices; nullptr for anything else.
-const char* take_plain_corner(const char* p, ObjBlock& block) {
+const char* parse_plain_corner(const char* p, ObjBlock& block) {
   IndexText first;
   std::uint32_t t = 0;
   std::uint32_t n = 0;
-  p = take_first_index(p, first);
+  p = parse_first_index(p, first);
   if (p == nullptr) return nullptr;
   if (*p == '/') {
     ++p;
-    if (*p != '/') p = take_next_index(p, first, t);
+    if (*p != '/') p = parse_next_index(p, first, t);
     if (p == nullptr) return nullptr;
-    if (*p == '/') p = take_next_index(p + 1, first, n);
+    if (*p == '/') p = parse_next_index(p + 1, first, n);
     if (p == nullptr) return nullptr;
   }
   const std::uint32_t v = first.value;
-  // No index is 0, which wraps to kNoIndex where there is none.
+  // No index is 0, which wraps to kNoIndex if none.
   static_assert(kNoIndex == static_cast<std::uint32_t>(-1));
   push_corner(block, {v - 1, t - 1, n - 1}, t != 0, n != 0);
   ObjCounts& highest = block.highest;
@@ -207,12 +207,12 @@ void push_corners(Scratch<std::uint32_t>& plane, FourIndices& highest,
 
 /// A triangle or a quadrangle of a kind of corners; nullptr for anything else.
 template <std::size_t kCorners, CornerKind kKind>
-const char* take_short_face(const char* p, ObjBlock& block) {
+const char* parse_short_face(const char* p, ObjBlock& block) {
   constexpr bool kUv = kKind == CornerKind::kUv || kKind == CornerKind::kUvNormal;
   constexpr bool kNormal = kKind == CornerKind::kNormal || kKind == CornerKind::kUvNormal;
   std::array<detail::CornerIndices, detail::indices_of(kKind)> indices;
   p = detail::take_corners<kCorners, kKind>(p, indices);
-  if (p != nullptr) p = take_line_end(p);
+  if (p != nullptr) p = parse_line_end(p);
   if (p == nullptr) return nullptr;
   if constexpr (kUv) {
     fill_plane(block, block.corner_uvs);
@@ -248,47 +248,47 @@ FaceShape shape_of(const char* p) {
 }
 
 template <std::size_t kCorners>
-const char* take_face_of(CornerKind kind, const char* p, ObjBlock& block) {
+const char* parse_face_of(CornerKind kind, const char* p, ObjBlock& block) {
   switch (kind) {
     case CornerKind::kPosition:
-      return take_short_face<kCorners, CornerKind::kPosition>(p, block);
+      return parse_short_face<kCorners, CornerKind::kPosition>(p, block);
     case CornerKind::kUv:
-      return take_short_face<kCorners, CornerKind::kUv>(p, block);
+      return parse_short_face<kCorners, CornerKind::kUv>(p, block);
     case CornerKind::kUvNormal:
-      return take_short_face<kCorners, CornerKind::kUvNormal>(p, block);
+      return parse_short_face<kCorners, CornerKind::kUvNormal>(p, block);
     case CornerKind::kNormal:
-      return take_short_face<kCorners, CornerKind::kNormal>(p, block);
+      return parse_short_face<kCorners, CornerKind::kNormal>(p, block);
   }
   return nullptr;
 }
 
-const char* take_face_of(FaceShape shape, const char* p, ObjBlock& block) {
-  if (shape.corners == 3) return take_face_of<3>(shape.kind, p, block);
-  return shape.corners == 4 ? take_face_of<4>(shape.kind, p, block) : nullptr;
+const char* parse_face_of(FaceShape shape, const char* p, ObjBlock& block) {
+  if (shape.corners == 3) return parse_face_of<3>(shape.kind, p, block);
+  return shape.corners == 4 ? parse_face_of<4>(shape.kind, p, block) : nullptr;
 }
 
 /// Tries the shape of the face before, then what this one seems to be.
-const char* take_likely_face(const char* p, ObjBlock& block) {
-  if (const char* const next = take_face_of(block.likely, p, block)) return next;
+const char* parse_likely_face(const char* p, ObjBlock& block) {
+  if (const char* const next = parse_face_of(block.likely, p, block)) return next;
   const FaceShape shape = shape_of(p);
   if (shape == block.likely) return nullptr;
   block.likely = shape;
-  return take_face_of(shape, p, block);
+  return parse_face_of(shape, p, block);
 }
 #endif
 
-const char* take_plain_face(const char* p, ObjBlock& block) {
+const char* parse_plain_face(const char* p, ObjBlock& block) {
 #ifdef __SSE2__
-  if (const char* const next = take_likely_face(p + 1, block)) return next;
+  if (const char* const next = parse_likely_face(p + 1, block)) return next;
 #endif
   std::uint32_t count = 0;
   while (*p == ' ') {
-    p = take_plain_corner(p + 1, block);
+    p = parse_plain_corner(p + 1, block);
     if (p == nullptr) break;
     ++count;
   }
   if (p != nullptr && count >= 3 && count <= kMaxFaceCorners)
-    p = take_line_end(p);
+    p = parse_line_end(p);
   else
     p = nullptr;
   if (p == nullptr) {
@@ -302,12 +302,12 @@ const char* take_plain_face(const char* p, ObjBlock& block) {
 /// Parses the v, vt, vn or f line at p if it is as plain as exporters write them: single blanks,
 /// plain numbers, positive indices, nothing else. Returns the start of the next line; nullptr for
 /// any other line, which leaves the block unchanged.
-const char* take_plain_statement(const char* p, ObjBlock& block) {
-  if (p[0] == 'f' && p[1] == ' ') return take_plain_face(p + 1, block);
+const char* parse_plain_statement(const char* p, ObjBlock& block) {
+  if (p[0] == 'f' && p[1] == ' ') return parse_plain_face(p + 1, block);
   if (p[0] != 'v') return nullptr;
-  if (p[1] == ' ') return take_plain_position(p + 1, block);
-  if (p[1] == 't') return take_plain_uv(p + 2, block);
-  if (p[1] == 'n') return take_plain_normal(p + 2, block);
+  if (p[1] == ' ') return parse_plain_position(p + 1, block);
+  if (p[1] == 't') return parse_plain_uv(p + 2, block);
+  if (p[1] == 'n') return parse_plain_normal(p + 2, block);
   return nullptr;
 }
 
@@ -388,7 +388,7 @@ class BlockParser {
     skip_blanks();
     if (at_end()) return false;
     NumberKind kind = NumberKind::kNone;
-    p_ = take_real(p_, end_, value, kind);
+    p_ = parse_real(p_, end_, value, kind);
     if (kind == NumberKind::kNotFinite) {
       note(ObjNote::kNotFinite);
       value = std::numeric_limits<double>::quiet_NaN();
@@ -410,7 +410,7 @@ class BlockParser {
     const char* p = p_;
     std::uint64_t lines = 0;
     while (p < end_) {
-      const char* const next = take_plain_statement(p, block_);
+      const char* const next = parse_plain_statement(p, block_);
       if (next == nullptr) break;
       p = next;
       ++lines;
@@ -475,13 +475,13 @@ class BlockParser {
     skip_statement();
   }
 
-  /// An index as written in the file: 0 where there is none, kTooLarge beyond what we hold.
+  /// An index as written in the file: 0 if none, kTooLarge beyond what we hold.
   std::int64_t index() {
     const bool negative = *p_ == '-';
     if (negative) ++p_;
     std::uint64_t value = 0;
     unsigned digits = 0;
-    p_ = detail::take_digits(p_, value, digits);
+    p_ = detail::parse_digits(p_, value, digits);
     if (digits > 10 || value > kTooLarge) value = kTooLarge;
     const auto index = static_cast<std::int64_t>(value);
     return negative ? -index : index;
@@ -585,6 +585,7 @@ class BlockParser {
     if (keep) {
       block_.face_corners.push(count);
     } else {
+      note(ObjNote::kLostFace);
       pop_corners(block_, count);
       block_.relative.resize(relative);
     }

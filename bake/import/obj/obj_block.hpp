@@ -32,6 +32,7 @@ enum class ObjNote : std::uint8_t {
   kZeroIndex,       ///< a corner with index 0
   kIndexRange,      ///< a corner that refers to no vertex of the file
   kNoPosition,      ///< a corner without a position
+  kLostFace,        ///< a face that is left out; of those above, too
   kAttributeRange,  ///< a uv or normal index beyond the file: the attribute is left out
   kCount
 };
@@ -79,7 +80,7 @@ namespace detail {
 enum class CornerKind : std::uint8_t { kPosition, kUv, kUvNormal, kNormal };
 }  // namespace detail
 
-/// What one look at a face's text wants to know before it.
+/// Expected layout of the next face line (fast path).
 struct FaceShape {
   unsigned corners = 3;
   detail::CornerKind kind = detail::CornerKind::kPosition;
@@ -133,8 +134,8 @@ struct ObjLimits {
 /// text can be read. limits: nullptr in the fast pass, where indices are resolved later.
 void parse_obj_block(const char* text, std::size_t size, const ObjLimits* limits, ObjBlock& block);
 
-/// The first statement end whose last byte lies in [from, size): one past a '\n' that is not
-/// continued by a backslash; 0 if there is none.
+/// The first statement end whose last byte is in [from, size): one past a '\n' that is not
+/// continued by a backslash; 0 if none.
 std::size_t first_statement_end(std::string_view text, std::size_t from);
 
 }  // namespace modar

@@ -37,8 +37,7 @@ namespace {
 
 constexpr std::uint64_t kMaxElements = 0x3FFFFFFFu;  ///< of each kind, and corners
 
-/// Arrays of a file of so many bytes will be large blocks, and begin as such: copied from the heap
-/// as they grew, they took a tenth of the time of reading 100 MB.
+/// Bytes of a file whose arrays begin as large blocks, which are not copied as they grow.
 constexpr std::uint64_t kLargeFile = 4 * kLargeBlock;
 
 class ObjAssembler {
@@ -56,7 +55,7 @@ class ObjAssembler {
   [[nodiscard]] bool needs_checked_pass() const;
   [[nodiscard]] bool too_large() const;
   /// Reads the materials and turns tallies into diagnostics.
-  void finish(const std::string& folder, const std::string& label, const ReadOptions& options);
+  void finish(const ModelFolder& folder, const std::string& label, const ReadOptions& options);
 
  private:
   template <class T>
@@ -113,6 +112,7 @@ constexpr NoteText kNoteTexts[] = {
      "their faces are left out; is the file cut short?"},
     {"obj.no-position", DiagnosticSeverity::kWarning, "corners have no vertex index",
      "their faces are left out"},
+    {"", DiagnosticSeverity::kInfo, "", ""},  // lost faces, which weld() reports
     {"obj.attribute-range", DiagnosticSeverity::kWarning,
      "corners refer to a uv or normal that does not exist", "the attribute is left out"},
 };
@@ -194,7 +194,7 @@ void ObjAssembler::add_plane(const ObjBlock& block, const Scratch<std::uint32_t>
     const IndexPlane::Kind kind = kind_of(block.corner_positions, indices);
     if (model_.corner_count() == 0 && kind != IndexPlane::Kind::kOwn) plane.kind = kind;
     if (plane.kind == kind) return;
-    // The rule no longer holds: write out the indices it stood for.
+    // The rule no longer holds: write out the indices that it replaced.
     if (plane.kind == IndexPlane::Kind::kSame) {
       plane.own = model_.corner_positions;
     } else {
@@ -275,11 +275,12 @@ void ObjAssembler::finish_colours(const std::string& label) {
   }
 }
 
-void ObjAssembler::finish(const std::string& folder, const std::string& label,
+void ObjAssembler::finish(const ModelFolder& folder, const std::string& label,
                           const ReadOptions& options) {
   finish_colours(label);
   for (std::size_t i = 0; i < notes_.size(); ++i) {
-    if (notes_[i].count == 0) continue;
+    if (i == static_cast<std::size_t>(ObjNote::kLostFace)) model_.lost_faces = notes_[i].count;
+    if (notes_[i].count == 0 || *kNoteTexts[i].id == '\0') continue;
     const NoteText& text = kNoteTexts[i];
     model_.diagnostics.push_back({text.id, text.severity, label, notes_[i].first_line,
                                   std::to_string(notes_[i].count) + " " + text.message, text.cure});
@@ -427,7 +428,7 @@ void shrink_arrays(SourceModel& model) {
 
 /// One pass over the text. totals: as in read_obj_blocks(). Returns the counts where some corner
 /// refers to nothing, so that a checked pass has to follow; otherwise nothing.
-Result<std::optional<ObjCounts>> parse_once(const ByteSource& source, const std::string& folder,
+Result<std::optional<ObjCounts>> parse_once(const ByteSource& source, const ModelFolder& folder,
                                             const std::string& label, const ReadOptions& options,
                                             const ObjCounts* totals, SourceModel& model) {
   ObjAssembler assembler(model, source.size());
@@ -437,7 +438,7 @@ Result<std::optional<ObjCounts>> parse_once(const ByteSource& source, const std:
   return std::nullopt;
 }
 
-Result<SourceModel> parse_source(const ByteSource& source, const std::string& folder,
+Result<SourceModel> parse_source(const ByteSource& source, const ModelFolder& folder,
                                  const std::string& stem, const std::string& label,
                                  const ReadOptions& options) {
   char bytes[4096];
@@ -493,12 +494,18 @@ Result<SourceModel> read_obj(const std::string& path, const ReadOptions& options
   const std::size_t slash = path.rfind('/');
   const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
   auto result = parse_source(ByteSource(descriptor, static_cast<std::uint64_t>(status.st_size)),
-                             folder, file_stem(path), path, options);
+                             {folder, options.within}, file_stem(path), path, options);
+  struct stat now {};
+  const bool same = ::fstat(descriptor, &now) == 0 && now.st_size == status.st_size &&
+                    now.st_mtim.tv_sec == status.st_mtim.tv_sec &&
+                    now.st_mtim.tv_nsec == status.st_mtim.tv_nsec;
   ::close(descriptor);
-  return result;
+  if (same) return result;
+  return fail(ExitCode::kIo, "io.changed", path, "the file was changed while it was read",
+              "try again when nothing writes to it");
 }
 
-Result<SourceModel> parse_obj(std::string_view text, const std::string& folder,
+Result<SourceModel> parse_obj(std::string_view text, const ModelFolder& folder,
                               const std::string& label, const ReadOptions& options) {
   return parse_source(ByteSource(text), folder, file_stem(label), label, options);
 }

@@ -14,16 +14,16 @@
 namespace modar {
 namespace {
 
-/// Bytes; the format has no limit, and a polygon of five million corners fits. Of 5 GB without the
-/// end of a line this much is read before it is refused: a GiB took 26 s.
+/// Bytes of a statement at most; the format has no limit. Higher reads more of a file without line
+/// ends before it is refused.
 constexpr std::uint64_t kMaxStatement = std::uint64_t{1} << 26;
 /// Bytes looked at ahead of a block to see whether its first line continues another: "\\\r\n".
 constexpr std::uint64_t kContext = 3;
 /// Bytes read behind a block at first to find the end of its last statement.
 constexpr std::size_t kSlack = 4096;
 
-/// Where the block's own statements begin in what was read from kContext bytes ahead of it; 0 where
-/// none does.
+/// Where the block's own statements begin in the bytes read from kContext bytes ahead of it; 0
+/// where none does.
 std::size_t find_first(std::string_view text) {
   return first_statement_end(text, static_cast<std::size_t>(kContext) - 1);
 }
@@ -82,7 +82,7 @@ LoadResult BlockLoader::load(std::uint64_t index, BlockText& block) const {
 }
 
 /// `text` ends at offset `at` of the source. Cuts it at the first statement end whose last byte
-/// lies at `look` or behind it, which the next block finds as well; reads on where it has none.
+/// is at `look` or behind it, which the next block finds as well; reads on where it has none.
 LoadResult BlockLoader::load_to_statement_end(std::uint64_t at, std::size_t look,
                                               std::string& text) const {
   std::uint64_t step = kSlack;

@@ -36,7 +36,7 @@ struct BlockText {
   std::string buffer;
 };
 
-/// Loads the statements that begin in block `index` (those behind the end of a statement that lies
+/// Loads the statements that begin in block `index` (those behind the end of a statement that is
 /// behind the start of the block), each up to its end. A statement longer than a block belongs to
 /// the block where it begins; the blocks in its middle are empty.
 class BlockLoader {

@@ -42,7 +42,7 @@ class HeaderParser {
       ++header_.lines;
       std::string_view copy = line;
       ended = next_word(copy) == "end_header";
-      if (!ended) MODAR_TRY(take_line(line));
+      if (!ended) MODAR_TRY(parse_line(line));
     }
     if (ended && stated_format_) return std::move(header_);
     return error(header_.lines == 0 ? "this is not a PLY file"
@@ -56,15 +56,15 @@ class HeaderParser {
                 "export the model again as PLY, OBJ or glTF");
   }
 
-  Result<void> take_line(std::string_view line) {
+  Result<void> parse_line(std::string_view line) {
     const std::string_view word = next_word(line);
     if (header_.lines == 1) {
       if (word == "ply") return {};
       return error("the file does not begin with 'ply'");
     }
-    if (word == "format") return take_format(next_word(line));
-    if (word == "element") return take_element(line);
-    if (word == "property") return take_property(line);
+    if (word == "format") return parse_format(next_word(line));
+    if (word == "element") return parse_element(line);
+    if (word == "property") return parse_property(line);
     if (word == "comment" && next_word(line) == "TextureFile") {
       while (line.starts_with(' ')) line.remove_prefix(1);
       while (line.ends_with('\r') || line.ends_with(' ')) line.remove_suffix(1);
@@ -74,7 +74,7 @@ class HeaderParser {
     return {};  // comments, and lines that programs write though no PLY has them
   }
 
-  Result<void> take_format(std::string_view name) {
+  Result<void> parse_format(std::string_view name) {
     stated_format_ = true;
     if (name == "ascii")
       header_.encoding = PlyHeader::Encoding::kText;
@@ -87,7 +87,7 @@ class HeaderParser {
     return {};
   }
 
-  Result<void> take_element(std::string_view line) {
+  Result<void> parse_element(std::string_view line) {
     PlyElement element;
     element.name = std::string(next_word(line));
     const std::string_view count = next_word(line);
@@ -101,7 +101,7 @@ class HeaderParser {
     return {};
   }
 
-  Result<void> take_property(std::string_view line) {
+  Result<void> parse_property(std::string_view line) {
     PlyProperty property;
     std::string_view type = next_word(line);
     if (type == "list") {

@@ -7,8 +7,10 @@
 #include <cstring>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "bake/import/obj/mtl_reader.hpp"
@@ -27,7 +29,20 @@ constexpr std::uint64_t kMostElements = 0x3FFFFFFFu;  ///< vertices and corners,
 class PlyValues {
  public:
   PlyValues(std::string_view bytes, const PlyHeader& header)
-      : bytes_(bytes), at_(header.bytes), encoding_(header.encoding) {}
+      : bytes_(bytes), at_(header.bytes), encoding_(header.encoding) {
+    if (!text()) return;
+    // An element a line, as all programs write it, unless there are too few lines.
+    std::uint64_t lines = 0;
+    for (std::size_t i = at_; i < bytes.size(); ++i) {
+      const bool ends = is_end(bytes[i]) || i + 1 == bytes.size();
+      if (ends && (i == at_ || !is_end(bytes[i - 1]))) ++lines;
+    }
+    std::uint64_t elements = 0;
+    for (const PlyElement& element : header.elements) {
+      if (!element.properties.empty()) elements += std::min(element.count, kMostElements);
+    }
+    by_line_ = lines >= elements;
+  }
 
   [[nodiscard]] std::size_t offset() const { return at_; }
   [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
@@ -42,12 +57,22 @@ class PlyValues {
     return bytes == 0 || !text() ? bytes : bytes - 1;  // the last line may have no end
   }
 
+  /// After an element: passes over what its line has beyond it. Returns whether there was anything.
+  bool end_element() {
+    if (!by_line_) return false;
+    bool more = false;
+    for (; at_ < bytes_.size() && !is_end(bytes_[at_]); ++at_) more = more || bytes_[at_] > ' ';
+    return more;
+  }
+
   /// False at the end of the file or where the text is no number.
   bool take(PlyType type, double& value) {
-    return text() ? take_text(value) : take_binary(type, value);
+    return text() ? take_text(value) : parse_binary(type, value);
   }
 
  private:
+  static bool is_end(char c) { return c == '\n' || c == '\r'; }
+
   template <class T>
   double value_of(const char* from) const {
     std::array<char, sizeof(T)> raw{};
@@ -56,7 +81,7 @@ class PlyValues {
     return static_cast<double>(std::bit_cast<T>(raw));
   }
 
-  bool take_binary(PlyType type, double& value) {
+  bool parse_binary(PlyType type, double& value) {
     const std::size_t size = ply_bytes(type);
     if (left() < size) return false;
     const char* const from = bytes_.data() + at_;
@@ -91,6 +116,7 @@ class PlyValues {
   std::string_view bytes_;
   std::size_t at_;
   PlyHeader::Encoding encoding_;
+  bool by_line_ = false;
 };
 
 /// What a vertex's property is.
@@ -169,8 +195,17 @@ class PlyReader {
                 "the file is truncated or damaged; copy or export it again");
   }
 
+  /// Colours in [0,1]. Floats beyond are of programs that write 0 to 255.
+  template <class It>
+  static void finish_colours(It begin, It end) {
+    float most = 0;
+    for (It c = begin; c != end; ++c) most = std::max({most, c->x, c->y, c->z});
+    const float full = most > 2.0f && most <= 255.0f ? 255.0f : 1.0f;
+    for (It c = begin; c != end; ++c) *c = glm::clamp(*c / full, 0.0f, 1.0f);
+  }
+
   /// Reads a list into list_. False at the end.
-  bool take_list(const PlyProperty& property) {
+  bool parse_list(const PlyProperty& property) {
     double count = 0;
     if (!values_.take(property.count_type, count) || !(count >= 0)) return false;
     const std::size_t least = values_.text() ? 1 : ply_bytes(property.type);
@@ -204,20 +239,21 @@ class PlyReader {
       for (std::size_t p = 0; p < roles.size(); ++p) {
         const PlyProperty& property = element.properties[p];
         const bool good =
-            property.list ? take_list(property)
+            property.list ? parse_list(property)
                           : values_.take(property.type, value[static_cast<std::size_t>(roles[p])]);
         if (!good) return cut_short(element, i);
       }
+      values_.end_element();
       model_.positions.push_back({value[1], value[2], value[3]});
       if (normals) {
         model_.normals.push_back(glm::vec3(glm::dvec3(value[4], value[5], value[6])));
       }
       if (uvs) model_.uvs.push_back({value[7], value[8]});
       if (colours) {
-        model_.colours.push_back(
-            glm::clamp(glm::vec3(glm::dvec3(value[9], value[10], value[11]) / full), 0.0f, 1.0f));
+        model_.colours.push_back(glm::vec3(glm::dvec3(value[9], value[10], value[11]) / full));
       }
     }
+    finish_colours(model_.colours.begin(), model_.colours.end());
     return {};
   }
 
@@ -231,9 +267,11 @@ class PlyReader {
       corners.clear();
       uvs.clear();
       double texture = 0;
+      std::array<double, kRoles> colour{};
+      int colours = 0;
       for (const PlyProperty& property : element.properties) {
         double value = 0;
-        if (!(property.list ? take_list(property) : values_.take(property.type, value))) {
+        if (!(property.list ? parse_list(property) : values_.take(property.type, value))) {
           return cut_short(element, i);
         }
         if (property.list &&
@@ -243,13 +281,22 @@ class PlyReader {
           uvs.swap(list_);
         } else if (property.name == "texnumber") {
           texture = value;
+        } else if (const Role role = role_of(property.name); !property.list && role >= Role::kRed) {
+          colour[static_cast<std::size_t>(role)] = value / full_of(property.type);
+          ++colours;
         }
       }
+      // MeshLab's header calls lists of corners' colours single ones.
+      colours_fit_ = !values_.end_element() && colours_fit_;
       if (!faces) continue;
       if (strips) {
         add_strip(corners);
       } else {
+        const std::uint64_t before = faces_;
         add_face(corners, uvs, texture);
+        if (colours == 3 && faces_ != before) {
+          face_colours_.push_back(glm::vec3(glm::dvec3(colour[9], colour[10], colour[11])));
+        }
       }
       if (model_.corner_count() > kMostElements) return cut_short(element, i);
     }
@@ -283,6 +330,35 @@ class PlyReader {
     ++faces_;
   }
 
+  /// Gives the corners of faces with a colour positions of that colour.
+  void colour_faces() {
+    if (face_colours_.size() != faces_ || !colours_fit_ || !model_.colours.empty()) return;
+    finish_colours(face_colours_.begin(), face_colours_.end());
+    const Array<glm::dvec3> positions = std::move(model_.positions);
+    const Array<glm::dvec2> uvs = std::move(model_.uvs);
+    const Array<glm::vec3> normals = std::move(model_.normals);
+    model_.positions = Array<glm::dvec3>();
+    model_.uvs = Array<glm::dvec2>();
+    model_.normals = Array<glm::vec3>();
+    std::map<std::tuple<std::uint32_t, float, float, float>, std::uint32_t> known;
+    std::size_t corner = 0;
+    for (std::uint64_t f = 0; f < faces_; ++f) {
+      const glm::vec3& colour = face_colours_[f];
+      for (; corner < first_corner_[f]; ++corner) {
+        std::uint32_t& p = model_.corner_positions[corner];
+        const auto number = static_cast<std::uint32_t>(model_.positions.size());
+        const auto [found, added] = known.try_emplace({p, colour.x, colour.y, colour.z}, number);
+        if (added) {
+          model_.positions.push_back(positions[p]);
+          model_.colours.push_back(colour);
+          if (!uvs.empty()) model_.uvs.push_back(uvs[p]);
+          if (!normals.empty()) model_.normals.push_back(normals[p]);
+        }
+        p = found->second;
+      }
+    }
+  }
+
   void add_strip(const std::vector<double>& corners) {
     std::size_t start = 0;
     for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -295,13 +371,28 @@ class PlyReader {
     }
   }
 
+  /// Whether the vertices have the scales and turns of 3D Gaussians.
+  [[nodiscard]] bool is_splat() const {
+    return std::ranges::any_of(header_.elements, [](const PlyElement& element) {
+      const auto has = [&](const char* name) {
+        return std::ranges::any_of(element.properties,
+                                   [&](const PlyProperty& p) { return p.name == name; });
+      };
+      return (has("scale_0") && has("rot_0")) || has("f_dc_0");
+    });
+  }
+
   Result<SourceModel> finish() {
     if (faces_ == 0) {
       return fail(ExitCode::kInvalidInput, "ply.no-faces", label_,
                   "the file has " + std::to_string(model_.positions.size()) +
                       " vertices but no usable face",
-                  "mesh the point cloud first, in MeshLab or CloudCompare");
+                  is_splat()
+                      ? "this is a Gaussian splat, which has no surface: bake a mesh that was "
+                        "made from the same photos"
+                      : "mesh the point cloud first, in MeshLab or CloudCompare");
     }
+    model_.lost_faces = left_out_;
     if (left_out_ != 0) {
       model_.diagnostics.push_back({"ply.left-out", DiagnosticSeverity::kWarning, label_, 0,
                                     std::to_string(left_out_) +
@@ -309,6 +400,7 @@ class PlyReader {
                                         "that do not exist",
                                     "they are left out; export the model again"});
     }
+    colour_faces();
     if (model_.corner_count() != 3 * faces_) {
       model_.first_corner.push_back(0);
       for (const std::uint32_t corner : first_corner_) model_.first_corner.push_back(corner);
@@ -335,12 +427,14 @@ class PlyReader {
   std::vector<std::uint32_t> first_corner_;  // of the face after each
   std::vector<std::uint32_t> corner_uvs_;    // of faces with uvs of their own
   std::vector<glm::dvec2> face_uvs_;
+  std::vector<glm::vec3> face_colours_;
+  bool colours_fit_ = true;  // the lines of faces have nothing beyond what the header says
   std::uint64_t faces_ = 0;
   std::uint64_t left_out_ = 0;
 };
 
 /// One material a picture that the header names, or one without.
-void add_materials(const PlyHeader& header, const std::string& folder, const std::string& label,
+void add_materials(const PlyHeader& header, const ModelFolder& folder, const std::string& label,
                    bool own_picture, SourceModel& model) {
   for (const std::string& statement : header.textures) {
     SourceMaterial& material = model.materials.emplace_back();
@@ -348,17 +442,17 @@ void add_materials(const PlyHeader& header, const std::string& folder, const std
     material.diffuse = glm::vec3(1.0f);
     material.diffuse_map = find_map_file(statement, folder, material.name, transformed);
     if (!material.diffuse_map.empty()) continue;
-    model.files.push_back(folder + material.name);
-    model.diagnostics.push_back({"ply.missing-texture", DiagnosticSeverity::kWarning, label, 0,
-                                 "the picture '" + statement + "' is not there",
-                                 "put it into the model's folder"});
+    model.files.push_back(folder.path + material.name);
+    model.diagnostics.push_back(not_read("ply.missing-texture", label, 0,
+                                         "texture '" + statement + "'", material.name, folder,
+                                         "put it into the model's folder"));
   }
   if (!model.materials.empty()) return;
   model.materials.emplace_back();
-  take_texture_by_name(folder, label, own_picture, model);
+  assign_texture_by_name(folder, label, own_picture, model);
 }
 
-Result<SourceModel> parse(std::string_view bytes, const std::string& folder,
+Result<SourceModel> parse(std::string_view bytes, const ModelFolder& folder,
                           const std::string& label, const ReadOptions& options = {}) {
   MODAR_ASSIGN(const PlyHeader header, parse_ply_header(bytes, label));
   MODAR_ASSIGN(SourceModel model, PlyReader(bytes, header, label).run());
@@ -373,14 +467,16 @@ Result<SourceModel> parse(std::string_view bytes, const std::string& folder,
 }  // namespace
 
 Result<SourceModel> parse_ply(std::string_view bytes, const std::string& label) {
-  return parse(bytes, "", label);
+  return parse(bytes, std::string(), label);
 }
 
 Result<SourceModel> read_ply(const std::string& path, const ReadOptions& options) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
   const std::size_t slash = path.rfind('/');
-  return parse({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()},
-               slash == std::string::npos ? "./" : path.substr(0, slash + 1), path, options);
+  return file.settle(
+      parse({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()},
+            {slash == std::string::npos ? "./" : path.substr(0, slash + 1), options.within}, path,
+            options));
 }
 
 }  // namespace modar

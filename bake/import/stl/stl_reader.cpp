@@ -14,7 +14,6 @@
 #include <xxhash.h>
 
 #include "bake/import/read_model.hpp"
-#include "bake/import/stl/facet_normals.hpp"
 #include "bake/import/text_words.hpp"
 #include "modar/mapped_file.hpp"
 
@@ -81,7 +80,7 @@ class PositionIndex {
   std::vector<std::uint32_t> slots_;
 };
 
-/// What is left out of a file, for one finding each.
+/// Omitted parts of a file, for one finding each.
 struct Skipped {
   std::uint64_t not_finite = 0;
 };
@@ -155,7 +154,7 @@ bool same_word(std::string_view word, std::string_view lower) {
 }
 
 /// Three numbers. False where there are fewer.
-bool take_corner(std::string_view line, StlCorner& corner) {
+bool parse_corner(std::string_view line, StlCorner& corner) {
   for (float& value : corner.at) {
     std::string_view word = next_word(line);
     if (word.starts_with('+')) word.remove_prefix(1);
@@ -183,7 +182,7 @@ Result<void> read_text(std::string_view text, const std::string& label, SourceMo
     const std::string_view word = next_word(line);
     bool good = true;
     if (same_word(word, "vertex")) {
-      good = take_corner(line, loop.emplace_back());
+      good = parse_corner(line, loop.emplace_back());
     } else if (same_word(word, "endloop") || same_word(word, "endfacet")) {
       close_loop();
     } else {
@@ -206,15 +205,19 @@ std::optional<std::uint64_t> binary_count(std::string_view bytes) {
   std::uint32_t count = 0;
   std::memcpy(&count, bytes.data() + 80, sizeof count);
   const std::uint64_t needed = kHeaderBytes + std::uint64_t{count} * kFacetBytes;
-  // Binary files whose header begins with "solid" are common: their size shows what they are.
+  // Binary files whose header begins with "solid" are common: their size shows what they are. Some
+  // programs write a few bytes behind the facets; a text has no zeros there.
+  const bool fits = needed == bytes.size() ||
+                    (needed < bytes.size() && bytes.find('\0') != std::string_view::npos);
   std::string_view start = bytes.substr(0, 80);
-  if (needed != bytes.size() && same_word(next_word(start), "solid")) return std::nullopt;
+  if (!fits && same_word(next_word(start), "solid")) return std::nullopt;
   return count;
 }
 
 }  // namespace
 
 Result<SourceModel> parse_stl(std::string_view bytes, const std::string& label) {
+  if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);
   SourceModel model;
   model.name = std::filesystem::path(label).stem().string();
   model.up = {UpAxis::kZ, UpReason::kConvention};  // of CAD programs and printers
@@ -237,6 +240,7 @@ Result<SourceModel> parse_stl(std::string_view bytes, const std::string& label) 
                 "export the model again");
   }
   index.finish();
+  model.lost_faces = skipped.not_finite;
   if (skipped.not_finite != 0) {
     model.diagnostics.push_back(
         {"stl.not-finite", DiagnosticSeverity::kWarning, label, 0,
@@ -245,13 +249,14 @@ Result<SourceModel> parse_stl(std::string_view bytes, const std::string& label) 
   }
   model.materials.emplace_back();
   model.material_runs = {{0, 0}};
-  add_facet_normals(model);
+  model.smoothing_runs = {{0, kUnstatedSmoothing}};
   return model;
 }
 
 Result<SourceModel> read_stl(const std::string& path) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
-  return parse_stl({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()}, path);
+  return file.settle(
+      parse_stl({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()}, path));
 }
 
 }  // namespace modar

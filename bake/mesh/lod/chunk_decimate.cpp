@@ -14,6 +14,7 @@
 #include <glm/geometric.hpp>
 
 #include "bake/import/source_model.hpp"
+#include "bake/mesh/lod/collapse_limits.hpp"
 #include "bake/mesh/lod/quadric.hpp"
 #include "bake/mesh/rays/triangle_tree.hpp"
 
@@ -117,12 +118,11 @@ class RemovedVertexMap {
   std::vector<std::uint16_t> detached_;
 };
 
-/// Weight of the texture's slide beside the surface's own error in the price of a collapse. Swept
-/// on scans: 0.89, 0.90 and 0.94 with 0.06, 0.25 and 1.
+/// Weight of the texture's shift against the surface's error in a collapse's price. Higher keeps
+/// textures in place, lower keeps shapes. [0.06, 1] tuned: lod
 constexpr double kShiftWeight = 0.25;
-/// Vertices by price, cheapest first; in the order in which they came where prices differ by less
-/// than a sixteenth. On a scan of 1.1 million triangles levels are as near as by a heap: rms within
-/// 1 %.
+/// Vertices by price, cheapest first; in the order of insertion where prices differ by less than a
+/// sixteenth.
 class PriceQueue {
  public:
   explicit PriceQueue(std::size_t vertices)
@@ -160,8 +160,8 @@ class PriceQueue {
   static constexpr std::uint16_t kNone = 0xFFFF;
 
  private:
-  // Floats of one sign are in the order of their bits: here 8 of the exponent and 4 more. The sign,
-  // which a price that is no number may have, is left out.
+  // Buckets of prices: floats of one sign sort by their bits, of which these are the exponent and
+  // the first of the mantissa.
   static constexpr std::size_t kBuckets = 1 << 12;
   static std::uint16_t bucket_of(float price) {
     return static_cast<std::uint16_t>(std::bit_cast<std::uint32_t>(price) << 1 >> 20);
@@ -189,6 +189,8 @@ class Decimator {
         limits_(limits),
         all_(vertices.positions.size()),
         quadrics_(vertices.positions.size()),
+        fan_sizes_(vertices.positions.size(), 0),
+        sides_(vertices.positions.size(), 0),
         queue_(vertices.positions.size()),
         removed_(vertices, indices.size() / 3) {
     for (std::size_t v = 0; v < all_.size(); ++v) all_[v].position = vertices.positions[v];
@@ -210,7 +212,7 @@ class Decimator {
     for (std::size_t v = 0; v < all_.size(); ++v) {
       if (const auto w = static_cast<std::uint16_t>(v); first_of(w) == w) estimate(w);
     }
-    while (alive_count_ > limits_.least_triangles && step()) continue;
+    while (alive_count_ > limits_.least_triangles && looks_left_ > 0 && step()) continue;
     return std::move(sequence_);
   }
 
@@ -228,21 +230,21 @@ class Decimator {
   /// Inside the surface, on a rim of it, or to be kept.
   enum class Kind : std::uint8_t { kInside, kRim, kLocked };
   /// Of a vertex: the collapse to try next; to itself where none is legal.
-  struct Best {
+  struct BestCollapse {
     float price = 0;
     std::uint16_t to = 0;
     std::uint16_t across = kNoTwin;
     bool exact = false;
     bool least = false;  ///< no other has a lower price by the quadrics
   };
-  /// What is asked of each neighbour, in one line of the cache.
+  /// Queried for each neighbour, in one line of the cache.
   struct alignas(64) Vertex {
     glm::dvec3 position{0.0};
     double own = 0;  ///< its quadric there
     double area = 0;
     std::uint32_t first = kNoIndex;  ///< its first corner
     std::uint32_t mark = 0;
-    Best best;
+    BestCollapse best;
     Kind kind = Kind::kLocked;
 
     void take(const Quadric& quadric) {
@@ -263,7 +265,7 @@ class Decimator {
   [[nodiscard]] std::uint16_t twin(std::uint16_t v) const {
     return vertices_.twins.empty() ? kNoTwin : vertices_.twins[v];
   }
-  /// The one of two twins that stands for both in the queue.
+  /// The one of two twins that represents both in the queue.
   [[nodiscard]] std::uint16_t first_of(std::uint16_t v) const { return std::min(v, twin(v)); }
 
   void add_triangles(std::span<const std::uint16_t> indices) {
@@ -275,10 +277,12 @@ class Decimator {
       for (std::uint32_t k = 0; k < 3; ++k) {
         corners_.push_back({all_[t[k]].first, t[(k + 1) % 3], t[(k + 2) % 3]});
         all_[t[k]].first = first_corner + k;
+        ++fan_sizes_[t[k]];
         quadrics_[t[k]] += plane;
       }
     }
     alive_count_ = corners_.size() / 3;
+    looks_left_ = kLooksATriangle * alive_count_;
   }
 
   /// Calls back with the corner of each triangle at v and the two vertices that follow v in it.
@@ -294,6 +298,7 @@ class Decimator {
       }
       callback(number, corner.a, corner.b);
       link = &corner.next;
+      if (looks_left_ > 0) --looks_left_;
     }
   }
 
@@ -350,14 +355,15 @@ class Decimator {
       around(v, [&](std::uint32_t, std::uint16_t u, std::uint16_t) { callback(u); });
       return;
     }
-    fan_.clear();
-    around(v, [&](std::uint32_t, std::uint16_t a, std::uint16_t b) { fan_.emplace_back(a, b); });
-    for (const auto& [a, b] : fan_) {
-      const auto before = [a = a](const auto& t) { return t.second == a; };
-      const auto after = [b = b](const auto& t) { return t.first == b; };
-      if (std::none_of(fan_.begin(), fan_.end(), before)) callback(a);
-      if (std::none_of(fan_.begin(), fan_.end(), after)) callback(b);
-    }
+    around(v, [&](std::uint32_t, std::uint16_t a, std::uint16_t b) {
+      sides_[a] |= 1u;
+      sides_[b] |= 2u;
+    });
+    around(v, [&](std::uint32_t, std::uint16_t a, std::uint16_t b) {
+      if (sides_[a] == 1) callback(a);
+      if (sides_[b] == 2) callback(b);
+    });
+    around(v, [&](std::uint32_t, std::uint16_t a, std::uint16_t b) { sides_[a] = sides_[b] = 0; });
   }
 
   /// Of a collapse, by the quadrics: the squared distance summed over the area, over its root. A
@@ -394,14 +400,15 @@ class Decimator {
   /// Queues the cheapest collapse of v by the quadrics alone.
   void estimate(std::uint16_t v) {
     if (all_[v].kind == Kind::kLocked) return;
-    list_moves(v);
+    moves_.clear();
+    if (fan_sizes_[v] < kWidestCollapse) list_moves(v);
     const auto least = std::min_element(moves_.begin(), moves_.end());
     all_[v].best.to = v;
     if (least == moves_.end()) return queue_.remove(v);
     queue(v, {static_cast<float>(least->price), least->to, least->across, false, true});
   }
 
-  void queue(std::uint16_t v, const Best& best) {
+  void queue(std::uint16_t v, const BestCollapse& best) {
     all_[v].best = best;
     queue_.put(v, best.price);
   }
@@ -412,7 +419,7 @@ class Decimator {
       const std::uint16_t v = queue_.take_front();
       if (v == PriceQueue::kNone) return false;
       if (!all_[v].best.exact && !find_legal(v)) continue;
-      const Best best = all_[v].best;
+      const BestCollapse best = all_[v].best;
       if (queue_.has_below(best.price)) {
         queue(v, best);
         continue;
@@ -454,6 +461,7 @@ class Decimator {
 
   /// The exact price of a collapse; nothing where it is not allowed.
   std::optional<double> legal_price(std::uint16_t v, std::uint16_t u) {
+    if (fan_sizes_[v] + fan_sizes_[u] > kWidestCollapse) return std::nullopt;
     double price = price_of(v, u);
     const double root = std::sqrt(all_[v].area + all_[u].area);
     if (price > limits_.max_error * limits_.max_error * root) return std::nullopt;
@@ -466,8 +474,8 @@ class Decimator {
     return price;
   }
 
-  /// Have v and u other common neighbours than those of the triangles between them, or no triangle
-  /// beside those? Then the surface would fold onto itself, or vanish.
+  /// Have v and u other common neighbours than those of the triangles between them, or no other
+  /// triangle? Then the surface would fold onto itself, or vanish.
   bool folds(std::uint16_t v, std::uint16_t u) {
     ++mark_;
     int between = 0;
@@ -499,7 +507,7 @@ class Decimator {
     return found;
   }
 
-  /// Lists the triangles that stay, as they are after the collapse.
+  /// Lists the remaining triangles, in their form after the collapse.
   void collect(std::uint16_t v, std::uint16_t u) {
     kept_.clear();
     around(v, [&](std::uint32_t corner, std::uint16_t a, std::uint16_t b) {
@@ -507,8 +515,8 @@ class Decimator {
     });
   }
 
-  /// The shift that the collapse leads to at v and the vertices that its triangles stand for; a
-  /// bound on it where that is allowed: that of v, beside what its triangles are off by.
+  /// The shift that the collapse leads to at v and the vertices that its triangles represent; a
+  /// bound on it where that is allowed: that of v, compared with the error of its triangles.
   double shift_after(std::uint16_t v, std::uint16_t u) {
     double before = 0;
     around(v, [&](std::uint32_t corner, std::uint16_t, std::uint16_t) {
@@ -536,6 +544,7 @@ class Decimator {
       ring_.push_back(b);
       if (a == u || b == u) {
         for (std::uint32_t k = 0; k < 3; ++k) corners_[3 * t + k].leave();
+        for (const std::uint16_t w : {v, a, b}) --fan_sizes_[w];
         --alive_count_;
         return;
       }
@@ -551,6 +560,7 @@ class Decimator {
     }
     all_[v].first = kNoIndex;
     all_[v].kind = Kind::kLocked;
+    fan_sizes_[u] += fan_sizes_[v];
     removed_.reattach(kept_);
     quadrics_[u] += quadrics_[v];
     all_[u].take(quadrics_[u]);
@@ -574,7 +584,7 @@ class Decimator {
     for (const std::uint16_t neighbour : ring_) {
       const std::uint16_t w = first_of(neighbour);
       if (std::exchange(all_[w].mark, mark_) == mark_) continue;
-      Best& best = all_[w].best;
+      BestCollapse& best = all_[w].best;
       const bool known = w != first_of(u) && best.to != w && !aims_at(w, u) && !aims_at(w, v);
       if (all_[w].kind != Kind::kInside || !known) {
         estimate(w);
@@ -587,7 +597,7 @@ class Decimator {
   }
 
   [[nodiscard]] bool aims_at(std::uint16_t a, std::uint16_t u) const {
-    const Best& best = all_[first_of(a)].best;
+    const BestCollapse& best = all_[first_of(a)].best;
     return best.to == u || best.across == u;
   }
 
@@ -596,7 +606,11 @@ class Decimator {
   std::vector<Corner> corners_;  // three a triangle
   std::size_t alive_count_ = 0;
   std::vector<Vertex> all_;
-  std::vector<Quadric> quadrics_;  // of each vertex
+  std::vector<Quadric> quadrics_;         // of each vertex
+  std::vector<std::uint32_t> fan_sizes_;  // triangles at each vertex
+  std::vector<std::uint8_t> sides_;       // of each vertex, while targets are listed: 1 begins a
+                                          // triangle's edge across, 2 ends one
+  std::size_t looks_left_ = 0;
   std::uint32_t mark_ = 0;
   PriceQueue queue_;
   RemovedVertexMap removed_;

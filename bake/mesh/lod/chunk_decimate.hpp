@@ -13,7 +13,7 @@ namespace modar {
 inline constexpr std::uint16_t kNoTwin = 0xFFFF;
 
 /// The vertices of a chunk. uvs: one a position, in a unit of the caller's, or none. twins: for
-/// each vertex the other one at its place, across a seam; kNoTwin where there is none; or none at
+/// each vertex the other one at its place, across a seam; kNoTwin if none; or none at
 /// all.
 struct ChunkVertices {
   std::span<const glm::dvec3> positions;
@@ -22,14 +22,14 @@ struct ChunkVertices {
 };
 
 struct DecimateLimits {
-  /// No collapse whose vertex lies farther from the planes that it stands for (root mean square,
+  /// No collapse whose vertex is farther from the planes that it represents (root mean square,
   /// weighted by area).
   double max_error = 0;
   /// No collapse that shifts the uv of a removed vertex by more.
   double max_uv_shift = 0;
   /// Length on the surface that a unit of uv covers: the price of a collapse counts both.
   double length_of_uv = 0;
-  /// Stops at so few triangles.
+  /// Stops at this number of triangles.
   std::size_t least_triangles = 0;
 };
 
@@ -47,9 +47,9 @@ struct CollapseSequence {
 
 /// Collapses edges in the order of quadric errors (Garland and Heckbert, "Surface simplification
 /// using quadric error metrics", 1997) and of the shift of uvs. Every collapse keeps one of its two
-/// vertices as it is, so that the result indexes the same vertices. Vertices on a rim (an edge of
+/// vertices unchanged, so that the result indexes the same vertices. Vertices on a rim (an edge of
 /// one triangle) move along it, twins along their seam, both to one place in two successive
-/// collapses. Kept as they are: vertices that are `locked`, and what is not manifold.
+/// collapses. Kept unchanged: vertices that are `locked`, and those that are not manifold.
 CollapseSequence decimate_chunk(const ChunkVertices& vertices,
                                 std::span<const std::uint16_t> indices,
                                 std::span<const std::uint8_t> locked, const DecimateLimits& limits);

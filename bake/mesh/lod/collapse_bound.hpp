@@ -12,15 +12,13 @@
 
 namespace modar {
 
-/// Of what the shading of a level shows, which decides when it is drawn: in large models, smaller
-/// distances from the finest are not told apart. Scans of 0.2 and 0.9 million triangles and a
-/// terrain show 100 to 500 times their distance. With 0.25, every fourth triangle of a scan's first
-/// level has to be measured, and a bake takes 1.04 times as long; 1 saves nothing more.
+/// Share of the shading's error below which distances of large models need no exact measure. Higher
+/// bakes faster and states the distance less exactly. [0.25, 1]
 inline constexpr double kHidden = 0.5;
 
 /// Which parts of two levels are near each other, as far as the way of each vertex tells.
 struct CollapseBound {
-  double moved = 0;  ///< bounds the distance of what is settled from the other level
+  double moved = 0;  ///< bounds the distance of the settled part from the other level
   /// 1 for each triangle of the finer level that is within the limit of the coarser one.
   std::vector<std::uint8_t> settled;
   std::vector<std::uint32_t> open;  ///< the triangles of the finer level that are not settled

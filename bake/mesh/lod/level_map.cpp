@@ -17,23 +17,25 @@
 namespace modar {
 namespace {
 
-/// Coarse triangles that the line of one edge goes through: a few from either end, else many. A
-/// long way from one end is mostly one around something, but where hundreds of triangles meet in
-/// one vertex there is no other. Swept on scans: flat from 6 to 24 for the few.
+/// Coarse triangles that an edge's line may cross from either end, before the long search. Lower
+/// starts the slow search more often. [6, 24] tuned: lod
 constexpr std::uint8_t kFewCrossed = 12;
 constexpr std::uint8_t kMostCrossed = 60;
-/// Coarse triangles that are looked at for a way where no plane leads along one: 30 of 4,900 such
-/// edges of a rough grid of 1.4 million triangles are left. Swept on scans: flat from 25 to 400.
+/// Coarse triangles searched for a way where no plane leads along one. Fewer leave more edges
+/// unmapped, more take time. [25, 400] tuned: lod
 constexpr std::size_t kMostSearched = 100;
+/// Triangles crossed by all lines of an edge, dead ends included. Models need up to 7.
+constexpr std::size_t kStepsAnEdge = 100;
 constexpr std::uint8_t kUntraced = 0xFF;
 constexpr std::uint16_t kNoVertex = 0xFFFF;
 
-/// Where a vertex comes to lie on the coarser level.
+/// Position of a vertex on the coarser level.
 struct Place {
   glm::dvec3 point{0.0};
   double square = 0;  ///< of its distance from the vertex
   std::uint32_t triangle = kNoIndex;
-  /// What it lies on: a vertex, an edge or all corners of a triangle; the others are kNoVertex.
+  /// The element under it: a vertex, an edge or all corners of a triangle; the others are
+  /// kNoVertex.
   std::array<std::uint16_t, 3> on{kNoVertex, kNoVertex, kNoVertex};
 
   [[nodiscard]] bool at_vertex() const { return on[1] == kNoVertex; }
@@ -61,7 +63,7 @@ class Outline {
   }
   [[nodiscard]] std::span<const std::uint32_t> triangles() const { return {all_.data(), count_}; }
 
-  /// What is left where another one does not go back the way that it came: at most two where it can
+  /// Remaining cases where another one does not return by the same way: at most two where it can
   /// be drawn together to a point. Coarse triangles meet in a vertex or an edge, so there is one
   /// way.
   void set_core_of(const Outline& whole) {
@@ -104,6 +106,7 @@ class LevelMap {
         coarse_(coarse),
         least_(least),
         bound_(least),
+        steps_left_(kStepsAnEdge * fine.indices().size()),
         places_(fine.vertices()),
         paths_(fine.indices().size()),
         mapped_(fine.triangles(), 0),
@@ -176,20 +179,20 @@ class LevelMap {
   /// Finds how far the farthest vertex is off, and better places for those that seem to be farther:
   /// near their places first, then among all triangles.
   void find_farthest(std::vector<std::uint32_t>& nearby) {
-    struct Far {
+    struct FarVertex {
       double square;
       std::uint16_t vertex;
       bool near_known;
-      bool operator<(const Far& other) const {
+      bool operator<(const FarVertex& other) const {
         return std::tie(square, vertex) < std::tie(other.square, other.vertex);
       }
     };
-    std::vector<Far> farther;
+    std::vector<FarVertex> farther;
     for (std::uint32_t v = 0; v < places_.size(); ++v) {
       if (places_[v].square <= limit() * limit()) continue;
       farther.push_back({places_[v].square, static_cast<std::uint16_t>(v), false});
     }
-    std::priority_queue<Far> far(std::less<Far>(), std::move(farther));
+    std::priority_queue<FarVertex> far(std::less<FarVertex>(), std::move(farther));
     while (!far.empty() && far.top().square > limit() * limit()) {
       const auto [square, v, near_known] = far.top();
       far.pop();
@@ -247,7 +250,7 @@ class LevelMap {
       // From a vertex, the line may start in any triangle around it.
       for (std::size_t i = 0; path.square < 0 && begin.at_vertex(); ++i) {
         const std::span<const std::uint32_t> around = coarse_.corners_at(begin.on[0]);
-        if (i == around.size()) break;
+        if (i == around.size() || steps_left_ < most) break;
         steps_.resize(path.first);
         path.square = walk(begin, end, around[i] / 3, along, most);
       }
@@ -273,12 +276,14 @@ class LevelMap {
   /// Appends the fewest triangles that lead from one place to another, for lines that no plane
   /// leads along. False where there are too many.
   bool search(const Place& from, const Place& to) {
+    if (steps_left_ < kMostSearched) return false;
+    steps_left_ -= kMostSearched;
     seen_.assign(1, {from.triangle, 0});
     for (std::uint32_t i = 0; i < seen_.size(); ++i) {
       if (is_on(to, seen_[i].triangle)) return append_way_to(i);
       for (std::uint32_t k = 0; k < 3 && seen_.size() < kMostSearched; ++k) {
         const std::uint32_t next = coarse_.neighbour(seen_[i].triangle, k);
-        const auto same = [next](const Seen& other) { return other.triangle == next; };
+        const auto same = [next](const SearchStep& other) { return other.triangle == next; };
         if (next == kNoIndex || std::any_of(seen_.begin(), seen_.end(), same)) continue;
         seen_.push_back({next, i});
       }
@@ -297,11 +302,13 @@ class LevelMap {
     return false;
   }
 
-  /// Appends the triangles from one place to another, along a plane that stands on the first one.
+  /// Appends the triangles from one place to another, along a plane perpendicular to the first one.
   /// Returns the greatest squared distance of a crossing from an edge of the finer level; below
-  /// zero where it does not get there through so few triangles.
+  /// zero if it does not arrive within this number of triangles.
   double walk(const Place& from, const Place& to, std::uint32_t at, const Line& line,
               std::uint8_t most) {
+    if (steps_left_ < most) return -1;
+    --steps_left_;
     steps_.push_back(at);
     if (is_on(to, at)) return 0;
     const std::array<glm::dvec3, 3> t = coarse_.triangle(at);
@@ -322,7 +329,7 @@ class LevelMap {
     double left_side = sides[(i + 1) % 3];
     double greatest = 0;
     double there = 0;
-    for (std::uint8_t steps = 1; steps < most; ++steps) {
+    for (std::uint8_t steps = 1; steps < most; ++steps, --steps_left_) {
       const glm::dvec3& right_end = coarse_.position(coarse_.indices()[corner]);
       const glm::dvec3& left_end = coarse_.position(coarse_.indices()[next_corner(corner)]);
       const double share = right_side / (right_side - left_side);
@@ -472,7 +479,7 @@ class LevelMap {
     return false;
   }
 
-  /// Finds the coarse triangles that are covered. Where no border of what is mapped passes, a
+  /// Finds the coarse triangles that are covered. Where no border of the mapped part passes, a
   /// triangle is covered like its neighbours; and once, at a border of both levels, and where it is
   /// one of the finer level and nothing else comes there.
   void spread() {
@@ -529,22 +536,23 @@ class LevelMap {
   double least_;
   double found_ = 0;  ///< a distance that a vertex has
   double bound_;
+  std::size_t steps_left_;
   std::vector<Place> places_;         // of each vertex
   std::vector<Path> paths_;           // of each corner of the finer level, see first_of()
   std::vector<std::uint32_t> steps_;  // of all paths
   /// A triangle that search() has looked at, and from which of them it came.
-  struct Seen {
+  struct SearchStep {
     std::uint32_t triangle;
     std::uint32_t before;
   };
-  std::vector<Seen> seen_;
-  Outline ring_;  // of the triangle that is being mapped, and what is left of it
+  std::vector<SearchStep> seen_;
+  Outline ring_;  // of the triangle that is being mapped, and the rest of it
   Outline core_;
   std::vector<std::uint8_t> mapped_;  // of each triangle of the finer level: without a tear
   std::vector<std::uint8_t> settled_;
   std::vector<std::uint8_t> far_;   // of each of the coarser: is one mapped there that is far off?
   std::vector<std::uint8_t> torn_;  // does a border pass through it?
-  std::vector<std::uint8_t> touches_;  // how many are mapped to it or beside it: 0, 1 or more
+  std::vector<std::uint8_t> touches_;  // how many are mapped to it or next to it: 0, 1 or more
   std::vector<std::uint8_t> same_;     // is one mapped to it that has its corners?
   std::vector<std::uint8_t> covered_;
 };

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -13,20 +14,20 @@
 namespace modar {
 namespace {
 
-/// Triangles of a box where they are searched for the nearest, on average, and boxes along the
-/// longest side: a search looks at all boxes, and at the triangles of a few. Swept on scans: the
-/// same time from 8 to 32, and from 24 to 96.
+/// Mean triangles of a box of the nearest-triangle search. More scan longer lists, fewer visit more
+/// boxes. [8, 32] tuned: lod
 constexpr double kBoxed = 16;
 constexpr double kMostCells = 48;
-/// Steps of a walk; what needs more is answered by where it has got to. Three levels off, a walk
-/// takes about five. Swept on scans: flat from 12 to 48.
+/// Steps of a walk to the nearest triangle; longer walks end where they are. Three levels apart,
+/// about five are needed. tuned: lod
 constexpr int kMostWalked = 24;
-/// Triangles around a vertex that a search looks at. Where a coarse level has few vertices between
-/// a chunk's borders, which stay, hundreds of triangles meet in one, and each vertex of the finest
-/// level would look at all of them; a tree finds the nearest then: a rough grid of 14.6 million
-/// triangles took 269 CPU-s before this and `seen`, 154 after (loaded machine). Swept on scans:
-/// flat from 16 to 64.
+/// Triangles around a vertex that a search visits before a tree takes over. Higher is slow where
+/// hundreds of triangles share a vertex. [16, 64] tuned: lod
 constexpr std::uint32_t kWidestFan = 32;
+/// Triangles and boxes that all searches of a surface look at, without and for each triangle:
+/// bounds the time where boxes overlap. Models need up to 13 million.
+constexpr std::size_t kMostLooked = 20'000'000;
+constexpr std::size_t kLookedATriangle = 300;
 
 }  // namespace
 
@@ -49,6 +50,15 @@ BasicLevelSurface<Index>::BasicLevelSurface(std::span<const glm::dvec3> position
     }
   }
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
+    if (fan_size(static_cast<Index>(v)) <= kWidestFan) continue;
+    if (by_end_.empty()) by_end_ = corners_;
+    std::sort(by_end_.begin() + begins_[v], by_end_.begin() + begins_[v + 1],
+              [&](std::uint32_t a, std::uint32_t b) {
+                return std::pair(indices_[next_corner(a)], a) <
+                       std::pair(indices_[next_corner(b)], b);
+              });
+  }
+  for (std::uint32_t v = 0; v < positions.size(); ++v) {
     for (std::uint32_t i = begins_[v]; i < begins_[v + 1]; ++i) {
       if (ends_[i] < v) continue;
       const std::uint32_t back = edge(ends_[i], static_cast<Index>(v));
@@ -59,31 +69,53 @@ BasicLevelSurface<Index>::BasicLevelSurface(std::span<const glm::dvec3> position
   }
 }
 
+/// Is the answer true for a corner whose edge goes from a vertex to another? In their order.
+template <class Index>
+template <class Callback>
+bool BasicLevelSurface<Index>::any_edge(Index from, Index to, const Callback& callback) const {
+  const std::uint32_t begin = begins_[from];
+  const std::uint32_t size = fan_size(from);
+  if (size <= kWidestFan) {
+    for (std::uint32_t i = begin; i < begin + size; ++i) {
+      if (ends_[i] == to && callback(corners_[i])) return true;
+    }
+    return false;
+  }
+  const auto end_of = [this](std::uint32_t corner) { return indices_[next_corner(corner)]; };
+  const auto end = by_end_.begin() + begin + size;
+  auto at = std::lower_bound(by_end_.begin() + begin, end, to,
+                             [&](std::uint32_t corner, Index v) { return end_of(corner) < v; });
+  for (; at != end && end_of(*at) == to; ++at) {
+    if (callback(*at)) return true;
+  }
+  return false;
+}
+
 template <class Index>
 std::uint32_t BasicLevelSurface<Index>::edge(Index from, Index to) const {
   std::uint32_t found = kNoIndex;
-  for (std::uint32_t i = begins_[from]; i < begins_[from + std::size_t{1}]; ++i) {
-    if (ends_[i] != to) continue;
-    if (found != kNoIndex) return kNoIndex;
-    found = corners_[i];
-  }
-  return found;
+  const bool several = any_edge(
+      from, to, [&](std::uint32_t corner) { return std::exchange(found, corner) != kNoIndex; });
+  return several ? kNoIndex : found;
 }
 
 template <class Index>
 bool BasicLevelSurface<Index>::has_edge(Index from, Index to) const {
-  const auto begin = ends_.begin() + begins_[from];
-  const auto end = ends_.begin() + begins_[from + std::size_t{1}];
-  return std::find(begin, end, to) != end;
+  return any_edge(from, to, [](std::uint32_t) { return true; });
 }
 
 template <class Index>
 std::uint32_t BasicLevelSurface<Index>::find(Index a, Index b, Index c) const {
-  for (std::uint32_t i = begins_[a]; i < begins_[a + std::size_t{1}]; ++i) {
-    if (ends_[i] != b) continue;
-    if (indices_[next_corner(next_corner(corners_[i]))] == c) return corners_[i] / 3;
+  // Around the vertex that has the fewest.
+  if (fan_size(b) < fan_size(a) || fan_size(c) < fan_size(a)) {
+    return fan_size(b) <= fan_size(c) ? find(b, c, a) : find(c, a, b);
   }
-  return kNoIndex;
+  std::uint32_t found = kNoIndex;
+  any_edge(a, b, [&](std::uint32_t corner) {
+    if (indices_[next_corner(next_corner(corner))] == c) found = corner / 3;
+    return found != kNoIndex;
+  });
+  return found;
 }
 
 template <class Index>
@@ -156,10 +188,16 @@ NearTriangle BasicLevelSurface<Index>::nearest(const glm::dvec3& point, double e
                                                const NearTriangle& near) {
   if (boxes_.empty()) make_boxes();
   NearTriangle found = near;
+  if (looked_ > kMostLooked + kLookedATriangle * triangles()) {
+    found.square = std::min(found.square, distance_square(point, triangle(found.triangle)));
+    return found;
+  }
+  looked_ += boxes_.size();
   for (const Box& box : boxes_) {
     if (found.square <= enough) break;
     const glm::dvec3 off = glm::max(glm::max(box.low - point, point - box.high), glm::dvec3(0.0));
     if (glm::dot(off, off) >= found.square) continue;
+    looked_ += box.end - box.first;
     for (std::uint32_t i = box.first; i < box.end; ++i) {
       const double square = distance_square(point, triangle(boxed_[i]), found.square);
       if (square < found.square) found = {square, boxed_[i]};

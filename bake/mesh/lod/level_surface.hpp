@@ -26,7 +26,7 @@ struct NearTriangle {
   std::uint32_t triangle = 0;
 };
 
-/// Triangles over some positions, Index: a number of these. A corner (3 t + i) stands for the edge
+/// Triangles over some positions, Index: a number of these. A corner (3 t + i) represents the edge
 /// from it to the next one.
 template <class Index>
 class BasicLevelSurface {
@@ -60,11 +60,11 @@ class BasicLevelSurface {
   [[nodiscard]] std::span<const std::uint32_t> corners_at(Index vertex) const {
     return {corners_.data() + begins_[vertex], corners_.data() + begins_[vertex + std::size_t{1}]};
   }
-  /// The only corner whose edge goes from a vertex to another; kNoIndex where there is none or
+  /// The only corner whose edge goes from a vertex to another; kNoIndex if none or
   /// several.
   [[nodiscard]] std::uint32_t edge(Index from, Index to) const;
   [[nodiscard]] bool has_edge(Index from, Index to) const;
-  /// Of each vertex a triangle whose corner it is, kNoIndex where there is none.
+  /// Of each vertex a triangle whose corner it is, kNoIndex if none.
   [[nodiscard]] std::vector<std::uint32_t> triangles_of_vertices() const;
   /// A triangle of these vertices, in this order, from whichever it begins; kNoIndex: none.
   [[nodiscard]] std::uint32_t find(Index a, Index b, Index c) const;
@@ -73,16 +73,25 @@ class BasicLevelSurface {
   /// The nearest one as far as those around it tell: the same walk, by distances.
   [[nodiscard]] NearTriangle nearest_around(const glm::dvec3& point, std::uint32_t start) const;
   /// The nearest of all; where some triangle is within `enough` (a square), any such one. near: one
-  /// that is probably near, the nearer the faster.
+  /// that is probably near, the nearer the faster. It is `near` itself once all searches together
+  /// have taken too long.
   NearTriangle nearest(const glm::dvec3& point, double enough, const NearTriangle& near);
 
  private:
+  [[nodiscard]] std::uint32_t fan_size(Index vertex) const {
+    return begins_[vertex + std::size_t{1}] - begins_[vertex];
+  }
+  template <class Callback>
+  bool any_edge(Index from, Index to, const Callback& callback) const;
+
   std::span<const glm::dvec3> positions_;
   std::span<const Index> indices_;
   std::vector<std::uint32_t> begins_;   ///< of each vertex: where its corners begin in corners_
   std::vector<std::uint32_t> corners_;  ///< by vertex
   std::vector<Index> ends_;             ///< of each of these: the vertex that its edge goes to
+  std::vector<std::uint32_t> by_end_;   ///< corners_ of wide fans, in the order of their ends
   std::vector<std::uint32_t> opposites_;
+  std::size_t looked_ = 0;  ///< by nearest()
   /// A box of space: the triangles whose centres are in a cell of a grid.
   struct Box {
     glm::dvec3 low;

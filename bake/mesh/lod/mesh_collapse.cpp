@@ -15,39 +15,54 @@
 namespace modar {
 namespace {
 
-/// Weight of the square of what the picture slides by, beside that of the surface's own error.
-/// Swept on scans and one of 170,000 textured triangles: 0.730, 0.732 and 0.724 with 0.5, 1 and 2.
+/// Weight of the squared texture shift against the surface's squared error. Higher keeps textures
+/// in place. [0.5, 2]
 constexpr double kSlideWeight = 1.0;
-/// Of an edge's length: the least point of its quadrics is no farther from its middle. Where planes
-/// are nearly parallel it may be anywhere. Swept on the same: 0.730, 0.732 and 0.732 with 0.75, 1.5
-/// and 3.
+/// Distance, in edge lengths, of the least point of the quadrics from the edge's middle. Limits
+/// drift where planes are nearly parallel. [0.75, 3]
 constexpr double kFarthest = 1.5;
-/// Of the quadrics, where prices are summed up again: the rest is of what the mesh is now. Without
-/// memory, what is thin shrinks a little in each collapse: a scan of 0.9 million triangles is off
-/// by 0.9 % of its size at an eighth; by 0.44, 0.11 and 0.11 % at 0.3, 0.5 and 0.6. What is smooth
-/// keeps its shape better without: rms of a terrain at 1/32 is 0.783, 0.798 and 0.812 of that of
-/// meshoptimizer's simplifyWithUpdate.
-constexpr double kRemembered = 0.5;
-/// Weight of the way of a place to where its quadric is least, beside the distance from its planes:
-/// it holds places where planes are nearly parallel. Of a scan of 0.9 million triangles, rms at an
-/// eighth is 6.0, 5.7 and 5.7 thousandths of a percent with 0.01, 0.001 and 0.0001; 7.3 unmoved.
+/// Share of the old quadrics kept when prices are recomputed. Lower shrinks thin parts, higher
+/// distorts smooth surfaces. [0.3, 0.6]
+constexpr double kQuadricMemory = 0.5;
+/// Weight of the distance from a quadric's least point, against that from its planes. Higher holds
+/// points where planes are nearly parallel.
 constexpr double kPull = 0.001;
-
-std::uint32_t root_of(std::vector<std::pair<std::uint32_t, std::uint32_t>>& joined,
-                      std::uint32_t id) {
-  for (const auto& [member, root] : joined) {
-    if (member == id) return root;
-  }
-  return id;
-}
+/// What a candidate of the queue costs, in looks at triangles.
+constexpr std::size_t kLooksACandidate = 16;
 
 }  // namespace
+
+void MeshCollapser::JoinedSets::clear() {
+  for (const std::uint32_t id : all) slots[id] = kNoIndex;
+  all.clear();
+  parents.clear();
+}
+
+void MeshCollapser::JoinedSets::add(std::uint32_t id) {
+  if (slots[id] != kNoIndex) return;
+  slots[id] = static_cast<std::uint32_t>(all.size());
+  parents.push_back(slots[id]);
+  all.push_back(id);
+}
+
+std::uint32_t MeshCollapser::JoinedSets::slot_of_root(std::uint32_t id) {
+  std::uint32_t slot = slots[id];
+  while (parents[slot] != slot) slot = parents[slot] = parents[parents[slot]];
+  return slot;
+}
+
+void MeshCollapser::JoinedSets::join(std::uint32_t a, std::uint32_t b) {
+  a = slot_of_root(a);
+  b = slot_of_root(b);
+  (all[a] < all[b] ? parents[b] : parents[a]) = all[a] < all[b] ? a : b;
+}
 
 MeshCollapser::MeshCollapser(CollapseMesh mesh)
     : mesh_(std::move(mesh)),
       alive_(mesh_.faces.size(), 1),
       left_(mesh_.faces.size()),
       alive_count_(mesh_.faces.size()),
+      looks_left_(kMeshLooksATriangle * mesh_.faces.size()),
       places_(mesh_.places.size()),
       corners_(3 * mesh_.faces.size()),
       parents_(mesh_.places.size()),
@@ -60,6 +75,8 @@ MeshCollapser::MeshCollapser(CollapseMesh mesh)
   }
   mesh_.places = {};
   mesh_.quadrics = {};
+  looks_.slots.assign(mesh_.looks.size(), kNoIndex);
+  shades_.slots.assign(mesh_.shades.size(), kNoIndex);
   link_faces();
   add_borders(1.0);
   settle();
@@ -72,6 +89,7 @@ void MeshCollapser::link_faces() {
     for (std::uint32_t k = 0; k < 3; ++k) {
       const std::uint32_t corner = 3 * f + k;
       const std::array<std::uint32_t, 2>& others = kOtherCorners[k];
+      ++places_[at[k]].faces;
       corners_[corner] = {std::exchange(places_[at[k]].first, corner), at[others[0]],
                           at[others[1]]};
     }
@@ -89,6 +107,7 @@ std::array<glm::dvec3, 3> MeshCollapser::corners_of(const CollapseFace& face) co
 
 void MeshCollapser::remove(std::uint32_t f) {
   for (std::uint32_t k = 0; k < 3; ++k) corners_[3 * f + k].leave();
+  for (const std::uint32_t place : mesh_.faces[f].places) --places_[place].faces;
   alive_[f] = 0;
   --alive_count_;
 }
@@ -100,23 +119,21 @@ void MeshCollapser::forget() {
   for (const std::uint32_t f : left_) {
     const auto& [a, b, c] = mesh_.faces[f].places;
     Quadric plane = Quadric::of_triangle(point_of(a), point_of(b), point_of(c));
-    plane *= 1 - kRemembered;
+    plane *= 1 - kQuadricMemory;
     for (const std::uint32_t place : {a, b, c}) {
       Quadric& quadric = places_[place].quadric;
-      if (std::exchange(marks_[place], mark_) != mark_) quadric *= kRemembered;
+      if (std::exchange(marks_[place], mark_) != mark_) quadric *= kQuadricMemory;
       quadric += plane;
     }
   }
-  // Collapses make no border where there was none.
-  for (const std::uint32_t f : left_) {
-    for (const std::uint32_t place : mesh_.faces[f].places) {
-      places_[place].open = places_[place].open && is_open(place);
-    }
+  // Collapses create no new border.
+  for (std::uint32_t place = 0; place < places_.size(); ++place) {
+    places_[place].open = places_[place].open && is_open(place);
   }
-  add_borders(1 - kRemembered);
+  add_borders(1 - kQuadricMemory);
 }
 
-/// Adds the planes across the borders of what is left.
+/// Adds the planes across the borders of the remaining mesh.
 void MeshCollapser::add_borders(double weight) {
   for (const std::uint32_t f : left_) {
     const std::array<std::uint32_t, 3>& at = mesh_.faces[f].places;
@@ -128,7 +145,7 @@ void MeshCollapser::add_borders(double weight) {
 
 /// Is some edge at a place one of a single triangle?
 bool MeshCollapser::is_open(std::uint32_t place) {
-  // Marks of what is beside the place: mark_ - 1 in one triangle, mark_ in several.
+  // Marks of the neighbourhood of the place: mark_ - 1 in one triangle, mark_ in several.
   mark_ += 2;
   int single = 0;
   around(place, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) {
@@ -147,6 +164,7 @@ void MeshCollapser::add_border(std::uint32_t f, std::uint32_t k, double weight) 
   const std::array<std::uint32_t, 3>& at = mesh_.faces[f].places;
   const std::uint32_t v = at[k];
   const std::uint32_t w = at[(k + 1) % 3];
+  if (is_wide(v, w)) return;
   std::size_t count = 0;
   around(v, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) { count += a == w || b == w; });
   if (count != 1) return;
@@ -175,6 +193,7 @@ void MeshCollapser::around(std::uint32_t place, const Callback& callback) {
     }
     callback(number, corner.a, corner.b);
     link = &corner.next;
+    if (looks_left_ > 0) --looks_left_;
   }
 }
 
@@ -197,8 +216,9 @@ std::vector<CollapseFace> MeshCollapser::faces() const {
 bool MeshCollapser::reduce_to(std::size_t triangles) {
   bool collapsed = true;
   while (alive_count_ > triangles) {
+    if (looks_left_ == 0) return false;
     if (queue_.empty()) {
-      // What was not legal before may be so now.
+      // Collapses that were not legal before may be legal now.
       if (!collapsed) return false;
       collapsed = false;
       fill_queue(alive_count_ - triangles);
@@ -226,7 +246,7 @@ bool MeshCollapser::reduce_to(std::size_t triangles) {
   return true;
 }
 
-/// collapses: about so many are to come.
+/// collapses: about this many will follow.
 void MeshCollapser::fill_queue(std::size_t collapses) {
   std::vector<Candidate> all;
   all.reserve(2 * alive_count_);
@@ -237,6 +257,7 @@ void MeshCollapser::fill_queue(std::size_t collapses) {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t a = at[k];
       const std::uint32_t b = at[(k + 1) % 3];
+      if (is_wide(a, b)) continue;
       if (a < b || (places_[a].open && places_[b].open)) all.push_back(candidate(a, b));
     }
   }
@@ -247,6 +268,7 @@ MeshCollapser::Candidate MeshCollapser::candidate(std::uint32_t a, std::uint32_t
   const std::uint32_t to = std::min(a, b);
   const std::uint32_t from = std::max(a, b);
   const auto price = static_cast<float>(target_of(to, from).price);
+  spend(kLooksACandidate);
   return {price, to, from, places_[to].version, places_[from].version};
 }
 
@@ -258,7 +280,9 @@ void MeshCollapser::push_around(std::uint32_t place) {
       if (std::exchange(marks_[other], mark_) != mark_) ring_.push_back(other);
     }
   });
-  for (const std::uint32_t other : ring_) queue_.push(candidate(place, other));
+  for (const std::uint32_t other : ring_) {
+    if (!is_wide(place, other)) queue_.push(candidate(place, other));
+  }
 }
 
 bool MeshCollapser::has_several_looks(std::uint32_t place) {
@@ -319,24 +343,15 @@ void MeshCollapser::collect(std::uint32_t a, std::uint32_t b) {
   join(&CollapseFace::shades, shades_);
 }
 
-void MeshCollapser::join(std::array<std::uint32_t, 3> CollapseFace::*member, Joined& joined) {
+void MeshCollapser::join(std::array<std::uint32_t, 3> CollapseFace::*member, JoinedSets& joined) {
   joined.clear();
-  const auto known = [&](std::uint32_t id) {
-    const bool is = std::any_of(joined.begin(), joined.end(),
-                                [&](const auto& each) { return each.first == id; });
-    if (!is) joined.emplace_back(id, id);
-  };
   for (const NearFace& near : near_) {
     const auto& ids = mesh_.faces[near.face].*member;
     std::uint32_t before = kNoIndex;
     for (std::size_t k = 0; k < 3; ++k) {
       if (!near.at[k]) continue;
-      known(ids[k]);
-      if (before != kNoIndex) {
-        const std::uint32_t low = std::min(root_of(joined, before), root_of(joined, ids[k]));
-        const std::uint32_t high = std::max(root_of(joined, before), root_of(joined, ids[k]));
-        for (auto& each : joined) each.second = each.second == high ? low : each.second;
-      }
+      joined.add(ids[k]);
+      if (before != kNoIndex) joined.join(before, ids[k]);
       before = ids[k];
     }
   }
@@ -345,23 +360,18 @@ void MeshCollapser::join(std::array<std::uint32_t, 3> CollapseFace::*member, Joi
 /// Squares of what the pictures slide by at a point, by the areas of the triangles of each look: it
 /// is beyond them by so much. Of collect().
 double MeshCollapser::slide_at(const glm::dvec3& point) {
+  spend(near_.size());
+  slides_.assign(looks_.all.size(), {std::numeric_limits<double>::infinity(), 0.0});
+  for (const NearFace& near : near_) {
+    const CollapseFace& face = mesh_.faces[near.face];
+    auto& [square, area] = slides_[looks_.slot_of_root(face.looks[near.first()])];
+    const std::array<glm::dvec3, 3> t = corners_of(face);
+    square = std::min(square, distance_square(point, t, square));
+    area += 0.5 * glm::length(glm::cross(t[1] - t[0], t[2] - t[0]));
+  }
   double sum = 0;
-  for (const auto& [look, root] : looks_) {
-    if (look != root) continue;
-    double square = std::numeric_limits<double>::infinity();
-    double area = 0;
-    for (const NearFace& near : near_) {
-      const CollapseFace& face = mesh_.faces[near.face];
-      bool has = false;
-      for (std::size_t k = 0; k < 3; ++k) {
-        has = has || (near.at[k] && root_of(looks_, face.looks[k]) == root);
-      }
-      if (!has) continue;
-      const std::array<glm::dvec3, 3> t = corners_of(face);
-      square = std::min(square, distance_square(point, t, square));
-      area += 0.5 * glm::length(glm::cross(t[1] - t[0], t[2] - t[0]));
-    }
-    sum += area * square;
+  for (std::size_t slot = 0; slot < slides_.size(); ++slot) {
+    if (looks_.stays(slot)) sum += slides_[slot].second * slides_[slot].first;
   }
   return sum;
 }
@@ -389,8 +399,8 @@ float MeshCollapser::loss_of(std::uint32_t a, std::uint32_t b) {
       square = std::max(square, glm::dot(side, side));
     }
   });
-  constexpr float kLeast = std::numeric_limits<float>::min();
-  return std::max(kLeast, static_cast<float>(std::sqrt(area) * square));
+  constexpr float kMinWeight = std::numeric_limits<float>::min();
+  return std::max(kMinWeight, static_cast<float>(std::sqrt(area) * square));
 }
 
 void MeshCollapser::drop(std::uint32_t place) {
@@ -445,8 +455,8 @@ void MeshCollapser::collapse(std::uint32_t to, std::uint32_t from, const glm::dv
     for (std::size_t k = 0; k < 3; ++k) {
       if (!near.at[k]) continue;
       face.places[k] = to;
-      face.looks[k] = root_of(looks_, face.looks[k]);
-      face.shades[k] = root_of(shades_, face.shades[k]);
+      face.looks[k] = looks_.all[looks_.slot_of_root(face.looks[k])];
+      face.shades[k] = shades_.all[shades_.slot_of_root(face.shades[k])];
       const std::array<std::uint32_t, 2>& others = kOtherCorners[k];
       corners_[3 * near.face + others[0]].b = to;
       corners_[3 * near.face + others[1]].a = to;
@@ -460,6 +470,7 @@ void MeshCollapser::collapse(std::uint32_t to, std::uint32_t from, const glm::dv
   kept.point = point;
   kept.quadric += gone.quadric;
   kept.open = kept.open || gone.open;
+  kept.faces += gone.faces;
   if (kept.several || gone.several) kept.several = has_several_looks(to);
   parents_[from] = to;
   ++kept.version;
@@ -482,28 +493,24 @@ struct MeshCollapser::Nearest {
   }
 };
 
-/// Calls back with each look, or shade, that stays, and the nearest point to go on to: of the
+/// Calls back with each remaining look or shade, and the nearest point that takes it over: of the
 /// triangles of collect() that have it. all: the nearest of all of them.
 template <class Callback>
 void MeshCollapser::carry(const glm::dvec3& point,
-                          std::array<std::uint32_t, 3> CollapseFace::*member, Joined& joined,
+                          std::array<std::uint32_t, 3> CollapseFace::*member, JoinedSets& joined,
                           const Nearest& all, const Callback& callback) {
-  const auto stays = [](const auto& each) { return each.first == each.second; };
+  std::size_t staying = 0;
+  for (std::size_t slot = 0; slot < joined.all.size(); ++slot) staying += joined.stays(slot);
   // All triangles have the only one.
-  const bool only = std::count_if(joined.begin(), joined.end(), stays) == 1;
-  for (const auto& [id, root] : joined) {
-    if (id != root) continue;
-    Nearest nearest;
-    for (const NearFace& near : near_) {
-      if (only) break;
-      const CollapseFace& face = mesh_.faces[near.face];
-      bool has = false;
-      for (std::size_t k = 0; k < 3; ++k) {
-        has = has || (near.at[k] && root_of(joined, (face.*member)[k]) == root);
-      }
-      if (has) nearest.consider(face, corners_of(face), point);
-    }
-    callback(root, only ? all : nearest);
+  std::vector<Nearest> nearest(joined.all.size(), staying == 1 ? all : Nearest());
+  for (const NearFace& near : near_) {
+    if (staying == 1) break;
+    const CollapseFace& face = mesh_.faces[near.face];
+    nearest[joined.slot_of_root((face.*member)[near.first()])].consider(face, corners_of(face),
+                                                                        point);
+  }
+  for (std::size_t slot = 0; slot < nearest.size(); ++slot) {
+    if (joined.stays(slot)) callback(joined.all[slot], nearest[slot]);
   }
 }
 
@@ -549,7 +556,7 @@ void MeshCollapser::carry_corners(const glm::dvec3& point) {
 void MeshCollapser::settle() {
   for (std::uint32_t place = 0; place < places_.size(); ++place) {
     Place& at = places_[place];
-    if (at.first == kNoIndex) continue;
+    if (at.first == kNoIndex || is_wide(place, place)) continue;
     const glm::dvec3 point = at.quadric.least_near(at.point, kPull);
     bool turned = false;
     around(place, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) {

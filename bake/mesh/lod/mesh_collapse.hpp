@@ -15,6 +15,7 @@
 #include <glm/vec4.hpp>
 
 #include "bake/import/source_model.hpp"
+#include "bake/mesh/lod/collapse_limits.hpp"
 #include "bake/mesh/lod/quadric.hpp"
 
 namespace modar {
@@ -44,7 +45,7 @@ struct CollapseFace {
 /// and two of their corners at one place: those are gone.
 struct CollapseMesh {
   std::vector<glm::dvec3> places;
-  std::vector<Quadric> quadrics;  ///< of each place: of the surface that it stands for
+  std::vector<Quadric> quadrics;  ///< of each place: of the surface that it represents
   std::vector<CornerLook> looks;
   std::vector<CornerShade> shades;
   std::vector<CollapseFace> faces;
@@ -55,7 +56,7 @@ struct CollapseMesh {
 template <class Candidate>
 class CollapseQueue {
  public:
-  /// Starts again with all of these, of which about so many will be taken.
+  /// Starts again with all of these, of which about this many will be taken.
   void fill(std::vector<Candidate> all, std::size_t taken) {
     aside_ = std::move(all);
     heap_.clear();
@@ -85,7 +86,7 @@ class CollapseQueue {
   }
 
  private:
-  /// Orders so many of those aside, and all of the price of the last of them.
+  /// Orders this many of those aside, and all of the price of the last of them.
   void draw(std::size_t count) {
     most_ = std::numeric_limits<float>::infinity();
     const auto dearer = [](const Candidate& a, const Candidate& b) { return a.price < b.price; };
@@ -107,7 +108,7 @@ class CollapseQueue {
 };
 
 /// Edge collapses, cheapest first, each to the point where the quadrics of its two ends are least.
-/// Every look and shade goes on to the point of its own island or smooth part that is nearest; what
+/// Every look and shade moves to the point of its own island or smooth part that is nearest; what
 /// the picture slides by is part of the price, so seams and borders of materials stay where they
 /// are as long as anything else is cheaper, and hold nothing up for ever. Pieces of two triangles
 /// go as a whole when their size is the cheapest.
@@ -115,7 +116,7 @@ class MeshCollapser {
  public:
   explicit MeshCollapser(CollapseMesh mesh);
 
-  /// Collapses until at most so many triangles are left. False: there is no way to so few.
+  /// Collapses down to a number of triangles. False: that number cannot be reached.
   bool reduce_to(std::size_t triangles);
 
   /// Prices by what the mesh is now and less by what it was before: keeps the shape of coarse
@@ -140,14 +141,15 @@ class MeshCollapser {
   std::uint32_t place_of(std::uint32_t place);
 
  private:
-  /// What is asked of a place at once, in two lines of the cache: collapses come from anywhere.
+  /// Queried of a place at once, in two lines of the cache: collapses come from anywhere.
   struct alignas(64) Place {
     Quadric quadric;
     glm::dvec3 point{0.0};
     std::uint32_t first = kNoIndex;  ///< its first corner
     std::uint32_t version = 0;
-    bool open = false;     ///< on an edge of one triangle
-    bool several = false;  ///< has several looks
+    std::uint32_t faces = 0;  ///< at it
+    bool open = false;        ///< on an edge of one triangle
+    bool several = false;     ///< has several looks
   };
   /// Of a triangle: the place's next corner, and the two places that follow it, which are equal
   /// where the triangle is gone.
@@ -158,7 +160,7 @@ class MeshCollapser {
     [[nodiscard]] bool is_gone() const { return a == b; }
     void leave() { a = b; }
   };
-  /// A collapse of `from` into `to`, as it was when it was priced.
+  /// A collapse of `from` into `to`, in its state when it was priced.
   struct Candidate {
     float price = 0;
     std::uint32_t to = 0;
@@ -178,13 +180,28 @@ class MeshCollapser {
     glm::dvec3 point{0.0};
     double price = 0;
   };
-  /// Looks or shades of two places, and that which each becomes.
-  using Joined = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+  /// Looks or shades of two places, and that which each becomes: the lowest of those it is joined
+  /// with.
+  struct JoinedSets {
+    std::vector<std::uint32_t> all;
+    std::vector<std::uint32_t> slots;  ///< of each look there is: its place in `all`, if it has one
+    std::vector<std::uint32_t> parents;  ///< by slot: one that it is joined with, or itself
+
+    void clear();
+    void add(std::uint32_t id);
+    void join(std::uint32_t a, std::uint32_t b);
+    std::uint32_t slot_of_root(std::uint32_t id);
+    [[nodiscard]] bool stays(std::size_t slot) const { return parents[slot] == slot; }
+  };
 
   template <class Callback>
   void around(std::uint32_t place, const Callback& callback);
   void link_faces();
   [[nodiscard]] std::array<glm::dvec3, 3> corners_of(const CollapseFace& face) const;
+  [[nodiscard]] bool is_wide(std::uint32_t a, std::uint32_t b) const {
+    return places_[a].faces + places_[b].faces > kWidestCollapse;
+  }
+  void spend(std::size_t looks) { looks_left_ -= std::min(looks, looks_left_); }
   void remove(std::uint32_t f);
   void add_borders(double weight);
   void settle();
@@ -203,24 +220,27 @@ class MeshCollapser {
   bool turns(std::uint32_t a, std::uint32_t b, const glm::dvec3& point);
   void collapse(std::uint32_t to, std::uint32_t from, const glm::dvec3& point);
   void collect(std::uint32_t a, std::uint32_t b);
-  void join(std::array<std::uint32_t, 3> CollapseFace::*member, Joined& joined);
+  void join(std::array<std::uint32_t, 3> CollapseFace::*member, JoinedSets& joined);
   struct Nearest;
   Nearest carry_looks(const glm::dvec3& point);
   void carry_corners(const glm::dvec3& point);
   template <class Callback>
   void carry(const glm::dvec3& point, std::array<std::uint32_t, 3> CollapseFace::*member,
-             Joined& joined, const Nearest& all, const Callback& callback);
+             JoinedSets& joined, const Nearest& all, const Callback& callback);
 
   /// A triangle at one of two places, and which of its corners are there.
   struct NearFace {
     std::uint32_t face = 0;
     std::array<bool, 3> at{};
+    /// The first of these. All have one look, and one shade, where they are joined.
+    [[nodiscard]] std::size_t first() const { return at[0] ? 0 : at[1] ? 1 : 2; }
   };
 
   CollapseMesh mesh_;                // its places are in places_
   std::vector<std::uint8_t> alive_;  // of each face
   std::vector<std::uint32_t> left_;  // faces, in order; some of them may be gone
   std::size_t alive_count_ = 0;
+  std::size_t looks_left_;
   std::vector<Place> places_;
   std::vector<Corner> corners_;         // three a triangle
   std::vector<std::uint32_t> parents_;  // of each place: what it went to, or itself
@@ -228,8 +248,9 @@ class MeshCollapser {
   std::uint32_t mark_ = 0;
   CollapseQueue<Candidate> queue_;
   std::vector<NearFace> near_;
-  Joined looks_;
-  Joined shades_;
+  JoinedSets looks_;
+  JoinedSets shades_;
+  std::vector<std::pair<double, double>> slides_;  // by slot of a look: a square, an area
   std::vector<std::uint32_t> ring_;
 };
 

@@ -24,51 +24,42 @@
 namespace modar {
 namespace {
 
-/// Chunks of fewer triangles get no coarser level: they cost a draw call either way. Swept on
-/// scans: the coarsest levels have 34, 666 and 1,014 triangles with 12 and 24, 48 in the place of
-/// 34 with 48.
+/// Chunks of fewer triangles get no coarser level. Lower adds levels that save no draw call. [12,
+/// 48]
 constexpr std::size_t kFewTriangles = 24;
 /// A level that keeps more of the previous one's triangles is not worth its bytes. Swept on scans:
 /// flat from 0.6 to 0.95.
 constexpr double kWorthwhile = 0.8;
-/// Of the chunk's diagonal: no collapse moves the surface farther. A level that is off by a pixel
-/// is then good for chunks down to four pixels across; what is smaller costs a draw call either
-/// way.
+/// Share of the chunk's diagonal that a collapse may move the surface. Higher makes levels that no
+/// distance draws.
 constexpr double kMaxCollapse = 0.25;
-/// Of the chunk's diagonal: the texture slides no farther at the vertices that are gone. Swept on
-/// scans: 0.93, 0.90 and 0.88 with 0.005, 0.01 and 0.02 (textures slide by as much more). Beside
-/// farther slides as a last resort, a bust has two levels less (of 273 and 186 triangles, off by 11
-/// and 50 % of its size), and a scan of 170,204 triangles ends at 6,201 and not at 5,318.
+/// Share of the chunk's diagonal that the texture may shift at removed vertices. Higher gives
+/// coarser levels with visible shifts. [0.005, 0.02] tuned: lod
 constexpr double kMaxSlide = 0.01;
-/// Where chunks cannot be halved any more, as the vertices that they share stay, a last level is no
-/// more than so many times farther off than the one before, by its prices; a halving makes it two
-/// to four times. Swept on scans: 0.87, 0.90 and 0.94 with 4, 8 and 16, whose coarsest levels have
-/// 1,864, 1,714 and 1,680 triangles. Without, a rough grid of 1.4 million triangles ends with
-/// 29,070 of 43,705 triangles at 25 times the error, which took two thirds of the time to measure;
-/// so, with 29,903 at 14 times. At 4 it would end with 31,374 at 6 times, but a scan of 170,204
-/// loses a level of one of its two chunks.
-constexpr float kSteepest = 8;
+/// Largest ratio of error between the last two levels when borders block further halving. Lower
+/// drops useful last levels, higher keeps bad ones. [4, 16] tuned: lod
+constexpr float kMaxErrorRatio = 8;
 /// A price (see CollapseSequence) below what half floats tell apart.
 constexpr float kLeastPrice = static_cast<float>(kDistanceFloor * kDistanceFloor);
-/// Of its share of the last cut, the triangles at which a chunk's decimation ends: the
-/// model's are shared out by need, and a flat chunk may lose more. Of five scans and a terrain, the
-/// bundles of all but one are the same as at a half, levels of the dragon take 0.9 of the time
-/// (`modar bake`).
+/// Share of its part of the cut at which a chunk's decimation ends. Lower moves triangles from flat
+/// chunks to detailed ones, higher bakes faster.
 constexpr double kLeastShare = 0.75;
-/// Of the error of the next coarser level: a level that is off by more is hardly ever drawn, as
-/// that one may be from nearly the same distance on. Bundles of five scans are smaller by 1 to 11 %
-/// without such levels, that of a rough grid by 17 %.
+/// Share of the next level's error above which a level is left out. Lower stores fewer levels,
+/// higher stores levels that are rarely drawn.
 constexpr double kAlike = 0.9;
-/// Where collapses leave more than one in so many triangles open, a map of the whole is faster.
+/// Where collapses leave more than one in this many triangles open, a map of the whole is faster.
 constexpr std::size_t kMostOpen = 8;
+/// Normals at one place that a corner chooses from: bounds the time where more are. Any number that
+/// models do not reach.
+constexpr int kMostNormals = 256;
 constexpr std::size_t kChunksPerUpdate = 8;  ///< chunks between two updates of the progress bar
 
 /// Vertices that differ in their normals only, as one: flat-shaded models have one for every corner
 /// of a triangle, and nothing would be inside a surface. Empty where the chunk is not like that.
 struct MergedVertices {
-  std::vector<std::uint16_t> first;    ///< of each vertex: the one that stands for it
+  std::vector<std::uint16_t> first;    ///< of each vertex: the one that represents it
   std::vector<std::uint16_t> next;     ///< of each vertex: another one of the same, kNoTwin: none
-  std::vector<std::uint16_t> indices;  ///< the chunk's, by those that stand for others
+  std::vector<std::uint16_t> indices;  ///< the chunk's, by those that represent others
 
   [[nodiscard]] bool stands(std::size_t vertex) const {
     return first.empty() || first[vertex] == vertex;
@@ -105,7 +96,7 @@ MergedVertices merge_vertices(const TriMesh& mesh, const Chunk& chunk) {
   return merged;
 }
 
-/// Gives the corners of triangles that stand for several vertices the one whose normal is nearest
+/// Gives the corners of triangles that represent several vertices the one whose normal is nearest
 /// to the triangle's.
 void split_normals(const TriMesh& mesh, const Chunk& chunk, const MergedVertices& merged,
                    std::span<const glm::dvec3> positions, std::vector<std::uint16_t>& indices) {
@@ -116,7 +107,8 @@ void split_normals(const TriMesh& mesh, const Chunk& chunk, const MergedVertices
         glm::cross(positions[indices[i + 1]] - origin, positions[indices[i + 2]] - origin);
     for (std::size_t k = i; k < i + 3; ++k) {
       double best = -std::numeric_limits<double>::max();
-      for (std::uint16_t v = indices[k]; v != kNoTwin; v = merged.next[v]) {
+      std::uint16_t v = indices[k];
+      for (int tried = 0; v != kNoTwin && tried < kMostNormals; v = merged.next[v], ++tried) {
         const double cosine = glm::dot(normal, glm::dvec3(mesh.normals[chunk.vertices[v]]));
         if (cosine <= best) continue;
         best = cosine;
@@ -130,7 +122,7 @@ void split_normals(const TriMesh& mesh, const Chunk& chunk, const MergedVertices
 struct SharedVertices {
   /// 1: must stay, so that the chunk meets its neighbours at any level.
   std::vector<std::uint8_t> locked;
-  /// The vertex across a seam inside the chunk, see ChunkVertices; empty where there is none.
+  /// The vertex across a seam inside the chunk, see ChunkVertices; empty if none.
   std::vector<std::uint16_t> twins;
 };
 
@@ -304,7 +296,7 @@ std::size_t triangles_after(const CollapseSequence& sequence, std::size_t all,
 }
 
 /// The cut that leaves the model `target` triangles or a few less: one for all chunks, so that
-/// triangles are where they matter. Nothing where so few cannot be reached.
+/// triangles are where they matter. Nothing if that number cannot be reached.
 std::optional<Cut> cut_for(const ChunkedMesh& mesh, const std::vector<CollapseSequence>& sequences,
                            std::size_t target) {
   const auto fits = [&](const Cut& cut) {
@@ -345,7 +337,7 @@ std::vector<Cut> cuts_for(const ChunkedMesh& mesh, const std::vector<CollapseSeq
     std::optional<Cut> cut = cut_for(mesh, sequences, triangles_in(mesh) >> level);
     const bool reached = cut.has_value();
     const float before = cuts.empty() ? 0.0f : cuts.back().price;
-    if (!reached) cut = {std::max(before, kLeastPrice) * kSteepest * kSteepest, 1.0};
+    if (!reached) cut = {std::max(before, kLeastPrice) * kMaxErrorRatio * kMaxErrorRatio, 1.0};
     cut->halvings = level;
     cuts.push_back(*cut);
     if (!reached) break;
@@ -366,7 +358,7 @@ std::vector<std::uint16_t> collapsed_triangles(std::span<const std::uint16_t> in
 }
 
 /// A level of a chunk, and how far it is from the finest. Which triangles are adjacent is looked up
-/// once it is asked for: of the finest level it mostly never is.
+/// on first use: of the finest level it mostly never is.
 class MeasuredLevel {
  public:
   MeasuredLevel(std::span<const glm::dvec3> positions, std::vector<std::uint16_t> triangles)
@@ -377,7 +369,7 @@ class MeasuredLevel {
     if (!surface_) surface_.emplace(positions_, indices);
     return *surface_;
   }
-  /// Of each vertex a triangle whose corner it is, kNoIndex where there is none.
+  /// Of each vertex a triangle whose corner it is, kNoIndex if none.
   const std::vector<std::uint32_t>& of_vertices() {
     if (of_vertices_.empty()) of_vertices_ = surface().triangles_of_vertices();
     return of_vertices_;
@@ -512,7 +504,7 @@ double greatest_uv_shift(LevelSurface& surface, const ChunkVertices& vertices,
 }
 
 /// Compares the looks of levels of one chunk with that of the finest: at its vertices, each of
-/// which stands for a third of the triangles around it. Where a vertex has several normals, at the
+/// which represents a third of the triangles around it. Where a vertex has several normals, at the
 /// middles of its triangles.
 class ChunkLooker {
  public:
@@ -632,10 +624,10 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged,
 }
 
 /// What the collapses ahead of a cut have left of a chunk that has its levels.
-StandInStart start_of(const TriMesh& mesh, const Chunk& chunk, const MergedVertices& merged,
-                      std::span<const glm::dvec3> positions, const CollapseSequence& sequence,
-                      const Cut& cut) {
-  StandInStart start;
+ProxyStart start_of(const TriMesh& mesh, const Chunk& chunk, const MergedVertices& merged,
+                    std::span<const glm::dvec3> positions, const CollapseSequence& sequence,
+                    const Cut& cut) {
+  ProxyStart start;
   const std::vector<std::uint16_t> become =
       collapsed_vertices(sequence, collapses_at(sequence, cut), positions.size());
   const auto of = [&](std::uint16_t v) {
@@ -683,10 +675,11 @@ std::vector<std::uint32_t> halvings_of(std::size_t triangles, const LevelOptions
   return halvings;
 }
 
-Result<std::vector<StandInStart>> make_levels(ChunkedMesh& mesh, const LevelOptions& options,
-                                              Report& report) {
+Result<std::vector<ProxyStart>> make_levels(ChunkedMesh& mesh, const LevelOptions& options,
+                                            Report& report) {
   MODAR_TRY(options.validate());
-  if (options.levels == 1) return std::vector<StandInStart>();
+  if (triangles_in(mesh) == 0) return no_triangle_left(mesh.mesh.name, "the levels need some");
+  if (options.levels == 1) return std::vector<ProxyStart>();
   StageTimer timer(report, "levels");
   std::vector<MergedVertices> merged;
   for (const Chunk& chunk : mesh.chunks) merged.push_back(merge_vertices(mesh.mesh, chunk));
@@ -713,7 +706,7 @@ Result<std::vector<StandInStart>> make_levels(ChunkedMesh& mesh, const LevelOpti
   });
   const std::vector<Cut> cuts = cuts_for(mesh, sequences, halvings);
   const double hidden = all > options.measured_triangles ? kHidden : 0.0;
-  std::vector<StandInStart> starts(options.start > 0 ? chunks : 0);
+  std::vector<ProxyStart> starts(options.start > 0 ? chunks : 0);
   const Cut start = cut_for(mesh, sequences, options.start).value_or(cuts.back());
   each_chunk(0.5, [&](std::size_t c) {
     Chunk& chunk = mesh.chunks[c];
@@ -743,11 +736,11 @@ Result<std::vector<StandInStart>> make_levels(ChunkedMesh& mesh, const LevelOpti
   return starts;
 }
 
-void drop_alike_levels(ChunkedMesh& mesh, double stand_in) {
+void drop_alike_levels(ChunkedMesh& mesh, double proxy) {
   const auto shown = [](const ChunkLevel& level) { return std::max(level.error, level.shading); };
   for (Chunk& chunk : mesh.chunks) {
     std::vector<ChunkLevel>& levels = chunk.coarser;
-    double next = stand_in;
+    double next = proxy;
     for (std::size_t i = levels.size(); i-- > 0;) {
       if (shown(levels[i]) > kAlike * next) {
         levels.erase(levels.begin() + static_cast<std::ptrdiff_t>(i));

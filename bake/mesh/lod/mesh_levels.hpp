@@ -11,7 +11,7 @@
 
 namespace modar {
 
-/// See LevelOptions. Measuring a scan of 37,626 triangles takes 0.18 of 0.36 CPU-s (`modar bake`).
+/// See LevelOptions. Measuring takes half of a bake's time at this size.
 inline constexpr std::size_t kMeasuredTriangles = 20'000;
 
 struct LevelOptions {
@@ -22,13 +22,13 @@ struct LevelOptions {
   /// million a phone draws the finest, and each level takes bytes and has to be measured. Without
   /// its half, a scan of 0.9 million triangles is baked in 0.92 of the time.
   std::size_t many_triangles = 300'000;
-  /// The distances of levels of larger models are told by the ways of their vertices, where the
-  /// shading shows far more: the bound holds, but is loose. Measuring those of a scan of 0.9
+  /// The distances of levels of larger models are derived from the ways of their vertices, where
+  /// the shading shows far more: the bound holds, but is loose. Measuring those of a scan of 0.9
   /// million triangles takes a quarter of its bake.
   std::size_t measured_triangles = kMeasuredTriangles;
-  /// Coarser levels are none of the chunks' (see plan_stand_ins()).
+  /// Coarser levels do not belong to chunks (see plan_proxies()).
   std::uint32_t most_halvings = 0xFFFFFFFFu;
-  std::size_t start = 0;  ///< as StandInPlan's; 0: none is asked for
+  std::size_t start = 0;  ///< as ProxyPlan's; 0: none is requested
   /// Pixels of each material's texture along a side, 0 where it has none; may be empty.
   std::vector<std::uint32_t> texture_sides;
   [[nodiscard]] Result<void> validate() const;
@@ -36,19 +36,20 @@ struct LevelOptions {
 
 inline constexpr std::uint32_t kMaxLevels = 12;
 
-/// What is left of a chunk where stand-ins begin: after more collapses than its coarsest level has,
+/// The rest of a chunk where proxies begin: after more collapses than its coarsest level has,
 /// with which borders of chunks stay where they are, and which are cheaper than those of a whole
 /// mesh.
-struct StandInStart {
+struct ProxyStart {
   std::vector<std::uint16_t> indices;   ///< what each corner of that level has become
   std::vector<std::uint16_t> vertices;  ///< that are left, of those that differ in normals one
-  std::vector<Quadric> quadrics;  ///< of each of these: of the triangles of level 0 it stands for
+  std::vector<Quadric>
+      quadrics;  ///< of each of these: of the triangles of level 0 that it represents
 };
 
 /// Triangles of level 0.
 std::size_t triangles_in(const ChunkedMesh& mesh);
 
-/// How often the triangles of a model of so many are halved at each coarser level.
+/// How often the triangles of a model of that size are halved at each coarser level.
 std::vector<std::uint32_t> halvings_of(std::size_t triangles, const LevelOptions& options);
 
 /// Gives chunks coarser levels over their own vertices. Each level of the model has about half of
@@ -61,50 +62,50 @@ std::vector<std::uint32_t> halvings_of(std::size_t triangles, const LevelOptions
 /// most do (flat shading): corners of coarser triangles take the normal that is nearest to the
 /// triangle's. A level's error bounds the distance between it and level 0, both as the device
 /// decodes them, measured from either to the other (see level_distance()), for coarse levels by way
-/// of a finer one that is hardly off, or told by the ways of vertices (see measured_triangles);
-/// beside it stands what its normals, its colours and its texture show (see PixelCells), which is
-/// far more. Where vertices of level 0 are gone, the texture has slid by no more than 1 % of the
-/// chunk's diagonal. Figures go to report.levels. Answers where stand-ins begin in each chunk, if
-/// the options have a start.
-Result<std::vector<StandInStart>> make_levels(ChunkedMesh& mesh, const LevelOptions& options,
-                                              Report& report);
+/// of a finer one that is hardly off, or told by the ways of vertices (see measured_triangles); the
+/// far larger error that normals, colours and texture show (see PixelCells) is a separate figure.
+/// Where vertices of level 0 are gone, the texture has slid by no more than 1 % of the chunk's
+/// diagonal. Figures go to report.levels. Answers where proxies begin in each chunk, if the
+/// options have a start.
+Result<std::vector<ProxyStart>> make_levels(ChunkedMesh& mesh, const LevelOptions& options,
+                                            Report& report);
 
 /// Takes out the levels that are hardly nearer to the finest than the next coarser one is.
-/// stand_in: the error that the renderer goes by of the one that comes after all of a chunk's
-/// levels; infinite where there is none, or chunks are drawn where it is not.
-void drop_alike_levels(ChunkedMesh& mesh, double stand_in);
+/// proxy: the error that the renderer goes by of the one that comes after all of a chunk's
+/// levels; infinite if none, or where chunks are drawn instead.
+void drop_alike_levels(ChunkedMesh& mesh, double proxy);
 
 /// A whole mesh as one coarse level, with vertices and chunks of its own.
-struct StandIn {
+struct Proxy {
   ChunkedMesh mesh;    ///< its chunks have no coarser levels
   double error = 0;    ///< model space: bounds the distance from level 0, and of level 0 from it
   double shading = 0;  ///< as ChunkLevel's
 };
 
-/// Which levels of a mesh are stand-ins: how often its triangles are halved at each, none: chunks
+/// Which levels of a mesh are proxies: how often its triangles are halved at each, none: chunks
 /// have all levels, else those before.
-struct StandInPlan {
+struct ProxyPlan {
   std::vector<std::uint32_t> halvings;
   std::size_t start = 0;  ///< triangles of all chunks from which the first is made
 };
 
-/// Small meshes need none. The coarsest is all that a first sight brings of the model (see
-/// LoadStage::kShow; of a scan of 70,000 triangles 12 KB instead of 546). options: of the chunks'
-/// levels, with which stand-ins are counted.
-StandInPlan plan_stand_ins(const ChunkedMesh& mesh, const LevelOptions& options);
+/// Small meshes need none. The coarsest is the only one that a preview contains of the model
+/// (see LoadStage::kShow; of a scan of 70,000 triangles 12 KB instead of 546). options: of the
+/// chunks' levels, with which proxies are counted.
+ProxyPlan plan_proxies(const ChunkedMesh& mesh, const LevelOptions& options);
 
-struct StandInOptions {
-  StandInPlan plan;
+struct ProxyOptions {
+  ProxyPlan plan;
   PositionKind positions = PositionKind::kHalf;  ///< whose decoded positions the errors are of
   std::size_t measured_triangles = kMeasuredTriangles;  ///< as LevelOptions'
 };
 
-/// Makes the stand-ins of a mesh whose chunks have their levels, the finest first, from where they
+/// Makes the proxies of a mesh whose chunks have their levels, the finest first, from where they
 /// begin in each chunk. Borders of chunks mean nothing to them, those of materials and uv islands
 /// are kept as long as anything else costs less. Fewer than planned where a mesh is in too many
 /// pieces. Vertices carry the normals, uvs, colours and occlusion of level 0.
-Result<std::vector<StandIn>> make_stand_ins(const ChunkedMesh& mesh,
-                                            const std::vector<StandInStart>& starts,
-                                            const StandInOptions& options, Report& report);
+Result<std::vector<Proxy>> make_proxies(const ChunkedMesh& mesh,
+                                        const std::vector<ProxyStart>& starts,
+                                        const ProxyOptions& options, Report& report);
 
 }  // namespace modar

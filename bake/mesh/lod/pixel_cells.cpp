@@ -12,17 +12,14 @@
 namespace modar {
 namespace {
 
-/// Bytes that a picture changes by where a normal changes by a radian: those of white in the light
-/// of the neutral room change by 60 to 130. Chosen with the next two on pictures of 13 scans and
-/// models (`modar check --visual`): where a level is first drawn and the model is 12 pixels wide or
-/// more, the 99th percentile of the difference is at most 1.9. At 120, 140 and 160 it is 2.6, 1.4
-/// and 1.6 of a bust at 13.9, 13.2 and 9.7 pixels.
+/// Steps of a colour that a picture changes by for a radian of a normal. Higher draws coarse levels
+/// later. [120, 160]
 constexpr float kNormalGain = 140;
-/// Bytes that it changes by where a vertex has a step more of 127 of the light from all around.
-/// Without, a pawn's level is drawn at 880 pixels, where it differs by 13.
+/// Steps of an 8-bit colour for one of 127 steps of ambient light. Lower draws levels too early on
+/// shaded models.
 constexpr float kOcclusionGain = 1;
-/// Bytes that it changes by where a texture slides by a pixel. At 30, levels of a capsule in a
-/// photograph are drawn where they differ by 3.6, at 80 and 100 where by 2.0 and 1.6.
+/// Steps of a colour for a texture shift of one pixel. Lower draws levels too early on photo
+/// textures. [30, 100]
 constexpr float kSlideGain = 100;
 /// Bytes, however far a texture slides: across a seam, it tells nothing.
 constexpr float kMostSlide = 60;
@@ -127,7 +124,7 @@ double PixelCells::smallest_pixel(std::span<const LookDifference> differences) {
   }
   const double finest = share_above(kBits);
   if (finest <= kShare) return 0;
-  // What differs in the finest averages out in larger ones, and goes on to.
+  // What differs in the finest averages out in larger ones, and is passed on.
   double finer = finest;
   double share = share_above(bits_);
   for (; share <= kShare; ++bits_) {

@@ -15,7 +15,7 @@ namespace modar {
 
 /// What a mesh shows at a point.
 struct Look {
-  glm::dvec3 normal{0.0};  ///< as it is blended, not of unit length
+  glm::dvec3 normal{0.0};  ///< as blended, not of unit length
   glm::dvec3 colour{0.0};  ///< of 255, as stored, and by how much occlusion changes the picture
   glm::dvec2 uv{0.0};
 };
@@ -29,7 +29,7 @@ struct LookDifference {
   glm::vec3 normal{0.0f};
   glm::vec3 colour{0.0f};  ///< of 255, as stored
   glm::vec2 slide{0.0f};   ///< of the texture, as a length on the surface
-  float area = 0;          ///< that the point stands for; 0: nothing is known of it
+  float area = 0;          ///< that the point represents; 0: nothing is known of it
 
   LookDifference() = default;
   /// length_of_uv: on the surface, 0 where no texture is seen.
@@ -46,7 +46,7 @@ struct LookDifference {
   }
 };
 
-/// Points of a surface in cells, each of which stands for a pixel: halves of a box, again and
+/// Points of a surface in cells, each of which represents a pixel: halves of a box, again and
 /// again.
 class PixelCells {
  public:

@@ -14,9 +14,8 @@ namespace modar {
 inline constexpr std::array<std::array<std::uint32_t, 2>, 3> kOtherCorners = {
     {{1, 2}, {2, 0}, {0, 1}}};
 
-/// Square of the cosine of 60 degrees: no triangle may turn farther in one collapse. Swept on
-/// scans: 0.89, 0.90 and 1.01 with 80, 60 and 30 degrees, and the greatest distance 0.99, 0.87
-/// and 1.01.
+/// Squared cosine of the largest turn of a triangle in one collapse. Higher blocks good collapses,
+/// lower folds triangles. [0.03, 0.75] tuned: lod
 inline constexpr double kLeastTurn = 0.25;
 
 /// Does the triangle a, b and `from` turn too far, or lose its area, when `from` goes to `to`?
@@ -28,9 +27,8 @@ inline bool turns_too_far(const glm::dvec3& a, const glm::dvec3& b, const glm::d
   return !(dot > 0) || dot * dot < kLeastTurn * glm::dot(before, before) * glm::dot(after, after);
 }
 
-/// Weight of the squared length of a rim's edge in the quadrics, beside the areas of triangles:
-/// keeps the outline. Swept on scans: 0.88, 0.90 and 0.93 with 0.25, 1 and 4, and the greatest
-/// distance 0.94, 0.87 and 0.91.
+/// Weight of a rim edge's squared length against triangle areas in the quadrics. Higher keeps
+/// outlines, lower keeps the inside. [0.25, 4] tuned: lod
 inline constexpr double kRimWeight = 1.0;
 
 /// Sum of the squared distances from planes, each weighted by its triangle's area (Garland and

@@ -151,7 +151,7 @@ Diagnostic what_was_lost(const TriMesh& source, const TriMesh& mesh, std::size_t
           source.name,
           0,
           std::string(text) + "; " + std::to_string(most_triangles) +
-              " were asked for, but its seams, pieces and faults allow no fewer",
+              " were requested, but its seams, pieces and faults allow no fewer",
           "join its pieces and weld its seams, or bake a simpler model"};
 }
 

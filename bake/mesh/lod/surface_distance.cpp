@@ -1,4 +1,4 @@
-// Subdivides triangles until each piece is known to lie within the bound.
+// Subdivides triangles until each piece is known to be within the bound.
 #include "bake/mesh/lod/surface_distance.hpp"
 
 #include <algorithm>
@@ -14,9 +14,8 @@
 namespace modar {
 namespace {
 
-/// A triangle whose corners alone prove that it is off by no more than this factor of a distance
-/// that was found needs no look at what lies between them. More loosens the bound. Swept on scans:
-/// flat from 1.05 to 1.4.
+/// Factor of the found distance within which a triangle's corners alone decide. Higher is faster
+/// and loosens the bound. [1.05, 1.4] tuned: lod
 constexpr double kQuick = 1.15;
 
 /// How often a triangle is quartered before it is cut along those of the other surface. Swept on
@@ -25,9 +24,12 @@ constexpr int kQuartered = 3;
 
 /// Model space: narrower parts are not cut off. Far above double rounding, far below half floats.
 constexpr double kSliver = 1e-9;
-/// Pieces of one triangle; the rest is bounded as it is, less tightly. Against endless subdivision,
+/// Pieces of one triangle; the rest is bounded without, less tightly. Against endless subdivision,
 /// as kMostSteps. Swept on scans: flat from 500 to 8,000.
 constexpr std::size_t kMostPieces = 2000;
+/// Pieces of all triangles, for each; the rest is then bounded by any triangle near it. Scans
+/// and models need up to 150.
+constexpr std::size_t kPieces = 400;
 /// Pieces of one triangle that walk from neighbour to neighbour; the rest is searched in the tree.
 constexpr std::size_t kMostSteps = 1500;
 
@@ -116,8 +118,8 @@ double corner_reach(const std::array<glm::dvec3, 3>& t) {
 template <class Index>
 class Bounder {
  public:
-  Bounder(BasicLevelSurface<Index>& to, double least, double found)
-      : to_(to), limit_(std::max(kDistanceFloor, least)), bound_(least) {
+  Bounder(BasicLevelSurface<Index>& to, double least, double found, std::size_t pieces)
+      : to_(to), limit_(std::max(kDistanceFloor, least)), bound_(least), pieces_left_(pieces) {
     raise_lower(found);
   }
 
@@ -211,6 +213,12 @@ class Bounder {
     while (!pieces_.empty()) {
       const Piece piece = pieces_.back();
       pieces_.pop_back();
+      if (pieces_left_ == 0) {
+        nearest_ = std::min({piece.target, piece.before, to_.triangles() - 1});
+        bound_ = std::max(bound_, corner_bound(piece));
+        continue;
+      }
+      --pieces_left_;
       if (piece.target != kNoIndex && pieces < kMostSteps) {
         ++pieces;
         step(piece);
@@ -233,8 +241,8 @@ class Bounder {
     return true;
   }
 
-  /// Cuts off what lies beyond the edges of the piece's target and hands it to the neighbours
-  /// there. What is left lies over the target: its distance is that from the target's plane.
+  /// Cuts off the parts beyond the edges of the piece's target and hands it to the neighbours
+  /// there. The rest is over the target: its distance is that from the target's plane.
   void step(Piece piece) {
     const std::uint32_t target = piece.target;
     const std::uint32_t came_from = std::exchange(piece.before, target);
@@ -264,7 +272,7 @@ class Bounder {
     for (const glm::dvec3& corner : piece.all()) {
       greatest = std::max(greatest, std::abs(glm::dot(corner - t[0], normal)));
     }
-    greatest += 2 * kSliver;  // corners may lie so far outside of the prism
+    greatest += 2 * kSliver;  // corners may be so far outside of the prism
     if (piece.count < Piece::kMost && greatest <= limit()) {
       bound_ = std::max(bound_, greatest);
     } else if (!accept_by(piece, t)) {
@@ -272,10 +280,10 @@ class Bounder {
     }
   }
 
-  /// Sends a piece that lies beyond edge i of a triangle to the neighbour there.
+  /// Sends a piece that is beyond edge i of a triangle to the neighbour there.
   void hand_over(Piece& piece, std::uint32_t from, std::uint32_t i, std::uint32_t came_from) {
     piece.target = to_.neighbour(from, i);
-    // Over an edge between two triangles, a piece may lie outside of both: it is nearest to the
+    // Over an edge between two triangles, a piece may be outside of both: it is nearest to the
     // edge.
     if (piece.target == came_from) {
       if (came_from != kNoIndex && accept_by(piece, to_.triangle(came_from))) return;
@@ -309,7 +317,7 @@ class Bounder {
   }
 
   /// Separates the part over the nearest triangle, which is mostly settled then, from the parts
-  /// beside it.
+  /// next to it.
   void divide(Piece piece) {
     piece.before = nearest_;
     const std::array<glm::dvec3, 3> t = to_.triangle(nearest_);
@@ -393,6 +401,7 @@ class Bounder {
   double lower_ = 0;  ///< a distance that was found
   double limit_;      ///< pieces within it need no closer look
   double bound_;
+  std::size_t pieces_left_;
   std::vector<Piece> pieces_;
   std::uint32_t nearest_ = kNoIndex;  ///< what find_nearest() found last
 };
@@ -403,7 +412,7 @@ template <class Index>
 double surface_distance(const BasicLevelSurface<Index>& from, BasicLevelSurface<Index>& to,
                         std::span<const std::uint32_t> nearby, double least, double found,
                         std::span<const std::uint8_t> settled) {
-  Bounder<Index> bounder(to, least, found);
+  Bounder<Index> bounder(to, least, found, kPieces * (from.triangles() + std::size_t{64}));
   const bool same_positions = from.positions().data() == to.positions().data();
   std::vector<std::uint32_t> left;
   std::vector<std::pair<double, Index>> probes;

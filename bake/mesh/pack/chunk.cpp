@@ -49,12 +49,11 @@ struct Stretch {
   [[nodiscard]] std::size_t size() const { return end - begin; }
 };
 
-/// A piece estimated to exceed the limit by this factor is split without counting its vertices: a
-/// wrong estimate would make chunks small. Grids of 0.9 and 1.3 million
-/// triangles have 29 and 42 chunks with 1.1 to 1.6.
+/// Estimated excess over the limit at which a piece is split without counting. Lower makes chunks
+/// too small when estimates are wrong. [1.1, 1.6]
 constexpr double kSurely = 1.25;
-/// What borders add to the vertices of a piece, and a margin for uneven halves. The same grids have
-/// 35, 29 and 32, and 56, 42 and 45 chunks with 1, 1.055 and 1.15.
+/// Allowance for borders' vertices and uneven halves. Lower splits too late, higher makes more
+/// chunks. [1, 1.15]
 constexpr double kMargin = 1.055;
 
 /// Marks that are looked at together, and what they are where all are set.
@@ -114,7 +113,7 @@ class ChunkBuilder {
     return sides[0] >= sides[1] && sides[0] >= sides[2] ? 0 : (sides[1] >= sides[2] ? 1 : 2);
   }
 
-  /// Moves the `middle` triangles that lie lowest along the longest side of their box to the front;
+  /// Moves the `middle` triangles that are lowest along the longest side of their box to the front;
   /// both parts keep file order, and ties go to the first in the file.
   void partition(const Stretch& items, std::size_t middle) {
     const std::int16_t* const centres = items_.centres[longest_axis(items)].data() + items.begin;
@@ -130,7 +129,7 @@ class ChunkBuilder {
     move_front(items_.triangles, items, middle, behind_triangles_);
   }
 
-  /// Marks what lies below `border`, and the first `ties` at it.
+  /// Marks the triangles below `border`, and the first `ties` at it.
   void mark_front(const std::int16_t* centres, std::size_t count, int border, std::size_t ties) {
     in_front_.resize((count + kTogether - 1) / kTogether * kTogether);
     for (std::size_t i = 0; i < count; ++i) {
@@ -145,7 +144,7 @@ class ChunkBuilder {
 
   /// Moves those of `values` that are marked to the front. Neighbours mostly go the same way, so
   /// eight are looked at together; where they do not, each is written to both parts and one of them
-  /// goes on, without branches, which would be mispredicted.
+  /// continues, without branches, which would be mispredicted.
   template <class T>
   void move_front(Array<T>& values, const Stretch& items, std::size_t middle, Array<T>& behind) {
     const std::size_t behind_size = items.size() - middle + 1;  // one more may be written
@@ -246,11 +245,6 @@ class ChunkBuilder {
 
 }  // namespace
 
-std::uint32_t chunk_vertices_for(std::size_t model_vertices) {
-  constexpr std::uint32_t kFinerFrom = 4;  // chunks
-  return model_vertices > kFinerFrom * std::size_t{kMaxChunkVertices} ? 16384 : kMaxChunkVertices;
-}
-
 Result<void> ChunkOptions::validate() const {
   if (max_vertices < 3 || max_vertices > kMaxChunkVertices) {
     return fail(ExitCode::kUsage, "chunk.max-vertices", "", "a chunk has 3 to 65535 vertices",
@@ -261,6 +255,7 @@ Result<void> ChunkOptions::validate() const {
 
 Result<ChunkedMesh> chunk(TriMesh mesh, const ChunkOptions& options, Report& report) {
   MODAR_TRY(options.validate());
+  if (mesh.triangles.empty()) return no_triangle_left(mesh.name, "there is nothing to split");
   StageTimer timer(report, "chunk");
   ChunkedMesh result;
   result.mesh = std::move(mesh);

@@ -9,6 +9,7 @@
 
 #include "bake/mesh/tri_mesh.hpp"
 #include "formats/base/error.hpp"
+#include "formats/layout.hpp"
 
 namespace modar {
 
@@ -45,7 +46,10 @@ struct ChunkOptions {
 /// The number of vertices that chunks of a model should have: the maximum, or a quarter of it where
 /// the model needs many chunks. Measured from inside a church of 14.8 M triangles: full chunks draw
 /// 1.70 times the triangles inside the frustum, quarter ones 1.26 times.
-std::uint32_t chunk_vertices_for(std::size_t model_vertices);
+constexpr std::uint32_t chunk_vertices_for(std::size_t model_vertices) {
+  constexpr std::uint32_t kFinerFrom = 4;  // chunks
+  return model_vertices > kFinerFrom * std::size_t{kMaxChunkVertices} ? 16384 : kMaxChunkVertices;
+}
 
 /// Splits by material, then by a kd tree over triangle centres until every chunk fits.
 /// Takes ownership of the mesh. Errors: kUnsupported "model.max-error" where one triangle is longer

@@ -35,8 +35,7 @@ MaterialRecord material_record(const SourceMaterial& source) {
 
 namespace {
 
-/// Chunks per thread between two joins: more balance load better and hold more memory, up to 2 MB
-/// each (65,535 vertices of 16 bytes and 131,000 triangles).
+/// Chunks per thread between two joins. More balance load better and hold up to 2 MB each.
 constexpr unsigned kWave = 4;
 
 /// One chunk in its final bytes, before its place in the buffers is known.
@@ -133,7 +132,7 @@ class ChunkPacker {
     }
   }
 
-  /// Without those of which two corners lie at one place as stored: they have no area.
+  /// Without those of which two corners have the same stored position: they have no area.
   [[nodiscard]] std::vector<std::uint16_t> lasting_triangles(
       const std::vector<std::uint16_t>& indices) const {
     const auto same = [this](std::uint16_t a, std::uint16_t b) {
@@ -262,7 +261,8 @@ void fill_model_record(const ChunkedMesh& chunked, const PackOptions& options,
   record.material_count = static_cast<std::uint32_t>(mesh.materials.size());
 }
 
-void tell_collapsed(const std::string& name, std::size_t count, PositionKind kind, Report& report) {
+void report_collapsed(const std::string& name, std::size_t count, PositionKind kind,
+                      Report& report) {
   if (count == 0) return;
   report.diagnostics.push_back(
       {"model.collapsed", DiagnosticSeverity::kInfo, name, 0,
@@ -335,7 +335,7 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
                 "all its triangles are smaller than the resolution of positions",
                 "bake it with --positions int16 or a --max-error");
   }
-  tell_collapsed(mesh.name, collapsed, options.positions, report);
+  report_collapsed(mesh.name, collapsed, options.positions, report);
   errors.write(mesh.placement.scale, out.record);
   timer.done(out.record.triangle_count, out.vertices.size() + out.indices.size(),
              out.record.position_error_max);

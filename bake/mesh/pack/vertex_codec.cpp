@@ -117,13 +117,22 @@ double longest_triangle(const TriMesh& mesh) {
   return longest;
 }
 
-/// Of the mean edge: half floats that may move vertices farther are not chosen. A triangle of equal
-/// sides is 0.87 of them high, and its ends come nearer by half a side at most, so that it keeps
-/// its area and its side. Of scans with 0.08, 0.11, 0.31 and 1.07 (a building of 14.6 million
-/// triangles), `modar bake --positions half --notes` leaves out 3 %, none, 0.4 % and 27 %.
-constexpr double kFoldingShare = 0.25;
-/// Half floats in [-1,1] move a coordinate by at most half a step of 2^-11.
-constexpr double kHalfError = kHalfDiagonal * 0x1p-11;
+/// Of the mean edge: half floats that move a vertex farther bend what triangles show.
+constexpr double kVisibleError = 0.05;
+
+/// Triangles that have an area, and none as half floats.
+std::size_t lost_as_half(const TriMesh& mesh) {
+  Array<glm::dvec3> stored(mesh.positions.size());
+  for (std::size_t v = 0; v < stored.size(); ++v) {
+    stored[v] = decoded_position(mesh.positions[v], PositionKind::kHalf, {});
+  }
+  std::size_t lost = 0;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const glm::dvec3 area = glm::cross(stored[b] - stored[a], stored[c] - stored[a]);
+    if (area == glm::dvec3(0.0)) ++lost;
+  }
+  return lost;
+}
 
 /// Mean length of the edges of every sixteenth triangle, model space.
 double mean_edge_of(const TriMesh& mesh) {
@@ -145,8 +154,14 @@ Result<PositionPlan> plan_positions(const TriMesh& mesh, const PositionRequest& 
   PositionPlan plan;
   plan.mean_edge = mean_edge_of(mesh);
   if (!(request.max_error > 0)) {
-    const bool folds = kHalfError > kFoldingShare * plan.mean_edge;
-    plan.kind = request.kind.value_or(folds ? PositionKind::kInt16 : PositionKind::kHalf);
+    if (request.kind) {
+      plan.kind = *request.kind;
+      return plan;
+    }
+    plan.half_error = half_error(mesh);
+    plan.half_loss = lost_as_half(mesh);
+    const bool harm = plan.half_loss != 0 || plan.half_error > kVisibleError * plan.mean_edge;
+    plan.kind = harm ? PositionKind::kInt16 : PositionKind::kHalf;
     return plan;
   }
   const double wanted = request.max_error / mesh.placement.scale;

@@ -24,7 +24,7 @@ enum class PositionKind : std::uint8_t {
 
 /// What the user asks for.
 struct PositionRequest {
-  /// Unset: half floats where they are exact enough and fold no triangles, else 16-bit integers,
+  /// Unset: half floats where they are exact enough and lose no triangle, else 16-bit integers,
   /// else floats.
   std::optional<PositionKind> kind;
   double max_error = 0.0;  ///< source units; 0: no limit
@@ -32,8 +32,10 @@ struct PositionRequest {
 
 struct PositionPlan {
   PositionKind kind = PositionKind::kHalf;
-  double max_side = 0.0;   ///< model space: longest side that a chunk may have; 0: no limit
-  double mean_edge = 0.0;  ///< model space; of every sixteenth triangle
+  double max_side = 0.0;      ///< model space: longest side that a chunk may have; 0: no limit
+  double mean_edge = 0.0;     ///< model space; of every sixteenth triangle
+  double half_error = 0.0;    ///< the same, of half floats; where it decides
+  std::size_t half_loss = 0;  ///< triangles that half floats would lose; the same
 };
 
 /// Errors: kUnsupported "model.max-error" where no layout, or not the requested one, is exact
@@ -60,7 +62,7 @@ int grid_index(double coordinate, double step);
 /// What a position decodes to, in model space.
 glm::dvec3 decoded_position(const glm::dvec3& position, PositionKind kind, const ChunkGrid& grid);
 
-/// Byte offsets of the attributes; 0 where there is none but the position.
+/// Byte offsets of the attributes; 0 if there is only the position.
 struct VertexOffsets {
   std::uint16_t normal = 0;
   std::uint16_t normal_components = 3;  ///< 2: octahedral
@@ -161,7 +163,7 @@ class VertexDecoder {
   [[nodiscard]] std::uint32_t stride() const { return layout_.stride; }
   /// Model space, in [-1,1].
   [[nodiscard]] glm::dvec3 position(const std::byte* vertex, const ChunkRecord& chunk) const;
-  /// Unit length; (0, 0, 1) where there is none.
+  /// Unit length; (0, 0, 1) if none.
   [[nodiscard]] glm::dvec3 normal(const std::byte* vertex) const;
   /// v down.
   [[nodiscard]] glm::dvec2 uv(const std::byte* vertex, const ChunkRecord& chunk) const;

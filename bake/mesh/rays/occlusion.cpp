@@ -2,6 +2,7 @@
 #include "bake/mesh/rays/occlusion.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <optional>
 #include <span>
@@ -17,18 +18,15 @@
 namespace modar {
 namespace {
 
-/// Directions in which every point has a ray. Against 256 rays of its own from each vertex, the
-/// share is then off by 0.0075 (a bust of 35,000 vertices), 0.018 (a head in shells) and 0.029 (two
-/// depth maps on each other), root of the mean square; time is proportional.
+/// Directions in which every point has a ray. More are smoother; time is proportional.
 constexpr std::size_t kAxes = 32;
-/// The same from clusters, which are off by more than the fewer directions add: a bust of 560,000
-/// vertices by 0.030, with 32 by 0.028.
+/// The same from clusters, whose own error exceeds that of fewer directions.
 constexpr std::size_t kClusterAxes = 20;
-/// Clusters that are thicker are layers or noise, where four times as many halve the error: a solid
-/// scan has 0.034, depth maps on each other 0.17, their geometric mean is 0.076.
+/// Relative thickness above which clusters are layers or noise and get four times as many rays.
+/// [0.034, 0.17]
 constexpr double kThick = 0.08;
 /// Model space, half a side is 1: farther surfaces hide nothing. Rooms seen from inside would be
-/// dark without a limit. Set by hand, on pictures.
+/// dark without a limit. Chosen on pictures.
 constexpr double kReach = 0.7;
 /// Model space: rays start so far above the surface, since normals are not the triangles' own.
 constexpr double kLift = 2e-3;
@@ -46,7 +44,7 @@ struct OcclusionPoints {
   std::vector<ParallelRays::Triangle> hiding;
 };
 
-/// Calls back with the vertices of every triangle, and whether it hides what is behind it.
+/// Calls back with the vertices of every triangle, and whether it is opaque.
 template <class Callback>
 void each_triangle(const ChunkedMesh& chunked, const Callback& callback) {
   for (const Chunk& chunk : chunked.chunks) {
@@ -123,10 +121,10 @@ struct HiddenSum {
   std::uint32_t all = 0;
 };
 
-void add_axis(ParallelRays& rays, const glm::vec3& axis, std::vector<HiddenSum>& sums) {
+bool add_axis(ParallelRays& rays, const glm::vec3& axis, std::vector<HiddenSum>& sums) {
   constexpr float kUnit = 65536;
   constexpr float kInverseReach = static_cast<float>(1 / kReach);
-  rays.cast(axis, {static_cast<float>(kLift), static_cast<float>(kReach)});
+  if (!rays.cast(axis, {static_cast<float>(kLift), static_cast<float>(kReach)})) return false;
   for (std::size_t i = 0; i < rays.size(); ++i) {
     HiddenSum& sum = sums[rays.point(i)];
     const float near = rays.distance(i) * kInverseReach;
@@ -134,9 +132,11 @@ void add_axis(ParallelRays& rays, const glm::vec3& axis, std::vector<HiddenSum>&
     sum.all += static_cast<std::uint32_t>(weight);
     sum.hidden += static_cast<std::uint32_t>(weight * std::max(0.0f, 1 - near * near));
   }
+  return true;
 }
 
-/// Of each point, the share of the light that reaches it.
+/// Of each point, the share of the light that reaches it; empty where so great a number of
+/// triangles overlap that it would take too long.
 std::vector<float> visible_shares(const OcclusionPoints& points, std::size_t axes, unsigned jobs) {
   std::vector<glm::vec3> origins = points.positions;
   for (std::size_t i = 0; i < origins.size(); ++i) {
@@ -145,11 +145,15 @@ std::vector<float> visible_shares(const OcclusionPoints& points, std::size_t axe
   const std::vector<glm::vec3> directions = half_sphere(axes);
   const std::size_t parts = std::clamp<std::size_t>(jobs, 1, axes);
   std::vector<std::vector<HiddenSum>> sums(parts);
+  std::atomic<bool> all{true};
   parallel_rows(static_cast<std::uint32_t>(parts), jobs, [&](std::uint32_t part) {
     sums[part].resize(origins.size());
     ParallelRays rays(origins, points.normals, points.positions, points.hiding);
-    for (std::size_t i = part; i < axes; i += parts) add_axis(rays, directions[i], sums[part]);
+    for (std::size_t i = part; i < axes && all; i += parts) {
+      if (!add_axis(rays, directions[i], sums[part])) all = false;
+    }
   });
+  if (!all) return {};
   std::vector<float> shares(origins.size());
   for (std::size_t i = 0; i < shares.size(); ++i) {
     HiddenSum sum;
@@ -194,10 +198,14 @@ Array<std::uint8_t> measure_occlusion(const ChunkedMesh& chunked, unsigned jobs,
   const std::size_t count = chunked.mesh.positions.size();
   Array<std::uint8_t> occlusion(count, 127);
   std::optional<SurfaceCells> clusters;
-  if (count > most_points) clusters = clusters_of(chunked, most_points);
-  const OcclusionPoints points = points_of(chunked, clusters ? &*clusters : nullptr);
-  if (points.hiding.empty()) return occlusion;
-  const std::vector<float> shares = visible_shares(points, clusters ? kClusterAxes : kAxes, jobs);
+  std::vector<float> shares;
+  for (; shares.empty(); most_points = std::min(count, most_points) / 8) {
+    if (most_points == 0) return occlusion;
+    if (count > most_points) clusters.emplace(clusters_of(chunked, most_points));
+    const OcclusionPoints points = points_of(chunked, clusters ? &*clusters : nullptr);
+    if (points.hiding.empty()) return occlusion;
+    shares = visible_shares(points, clusters ? kClusterAxes : kAxes, jobs);
+  }
   if (clusters) {
     spread_shares(chunked, *clusters, shares, jobs, occlusion);
   } else {

@@ -10,15 +10,17 @@
 namespace modar {
 namespace {
 
-/// Cells of the grid for each point. Of a bust's 35,000 vertices, 0.5 and 2 take longer.
+/// Cells of the grid for each point. Both 0.5 and 2 are slower.
 constexpr float kCellsAPoint = 1.0f;
 constexpr float kMostRows = 2047;  // more of a side are no faster
 constexpr float kOutside = 1e9f;
 constexpr float kRowSlack = 1e-2f;  // cells; more than places in single precision are off by
-/// Triangles over at most so many rows are not clipped to each. Of a bust of 70,000 triangles the
-/// bake without levels takes 1.09 times as long with 3, and as long with 10 and 16.
+/// Triangles over at most this many rows are not clipped to each. Lower clips more often. [3, 16]
 constexpr std::uint32_t kFewRows = 6;
 constexpr float kLeastWidth = 1e-3f;  // of a grid, as points in a line have none
+/// Groups of points and rows of cells that triangles are tried with in one direction, for each
+/// triangle and point. Models need up to 66.
+constexpr std::size_t kMostTried = 100;
 
 }  // namespace
 
@@ -126,8 +128,9 @@ inline void ParallelRays::meet_row(const Facet& facet, std::uint32_t row, std::u
                                    std::uint32_t right, Four from) {
   const std::uint32_t* starts = &starts_[std::size_t{row} * columns_];
   Group* const groups = groups_.data();
-  // Those of a group that lie before or behind the row's are tried for nothing.
+  // Those of a group before or behind the row's are tried in vain.
   Group* const end = groups + (starts[right + 1] + 3) / 4;
+  tried_ += 1 + (starts[right + 1] - starts[left]) / 4;
   for (Group* group = groups + starts[left] / 4; group < end; ++group) {
     const Four x = group->x - facet.x;
     const Four y = group->y - facet.y;
@@ -141,7 +144,7 @@ inline void ParallelRays::meet_row(const Facet& facet, std::uint32_t row, std::u
   }
 }
 
-/// Where a triangle lies within a row of the grid, from left to right; nowhere: the wrong way
+/// The extent of a triangle within a row of the grid, from left to right; nowhere: the wrong way
 /// round.
 std::pair<float, float> ParallelRays::extent_in_row(const Corners& corners,
                                                     std::uint32_t row) const {
@@ -183,7 +186,7 @@ void ParallelRays::meet(const Corners& corners, float from) {
   }
 }
 
-void ParallelRays::cast(const glm::vec3& axis, const Lengths& lengths) {
+bool ParallelRays::cast(const glm::vec3& axis, const Lengths& lengths) {
   const glm::vec3 other = std::fabs(axis.x) < 0.6f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
   Frame frame;
   frame.axis = axis;
@@ -195,9 +198,13 @@ void ParallelRays::cast(const glm::vec3& axis, const Lengths& lengths) {
     const Place place = frame.of(positions_[i]);
     places_[i] = {place.x - low.x, place.y - low.y, place.depth};
   }
+  tried_ = 0;
+  const std::size_t most = kMostTried * (triangles_.size() + origins_.size());
   for (const Triangle& t : triangles_) {
     meet({places_[t[0]], places_[t[1]], places_[t[2]]}, lengths.from);
+    if (tried_ > most) return false;
   }
+  return true;
 }
 
 }  // namespace modar

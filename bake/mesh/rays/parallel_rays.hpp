@@ -12,7 +12,7 @@
 namespace modar {
 
 /// Casts a ray along one axis from each of many points, to the side of the axis that the point's
-/// normal looks to. The points lie in a grid across the axis; each triangle looks up those behind
+/// normal looks to. The points form a grid across the axis; each triangle looks up those behind
 /// it, so that an axis costs some 30 ns a triangle where points are as dense as its corners.
 class ParallelRays {
  public:
@@ -23,14 +23,15 @@ class ParallelRays {
     float to = 0;    ///< nor are farther ones
   };
 
-  /// Rays start at `origins`, one a normal; triangles are over `positions`. All lie in [-2,2] and
+  /// Rays start at `origins`, one a normal; triangles are over `positions`. All are in [-2,2] and
   /// are the caller's.
   ParallelRays(std::span<const glm::vec3> origins, std::span<const glm::vec3> normals,
                std::span<const glm::vec3> positions, std::span<const Triangle> triangles);
 
   /// Casts along a direction of unit length, or against it. Rays that pass an edge within the
-  /// rounding of single precision may miss both of its triangles.
-  void cast(const glm::vec3& axis, const Lengths& lengths);
+  /// rounding of single precision may miss both of its triangles. False where triangles cover more
+  /// of the grid than kMostTried allows: nothing is found then.
+  [[nodiscard]] bool cast(const glm::vec3& axis, const Lengths& lengths);
 
   /// What cast() found: of the ray in place i, whose it is, how directly its normal looks along the
   /// ray (cosine), and the distance of what it meets first, or `to`.
@@ -88,6 +89,7 @@ class ParallelRays {
   float last_column_ = 0;  // of the grid
   float last_row_ = 0;
   std::uint32_t columns_ = 1;
+  std::size_t tried_ = 0;  // in this direction
   std::vector<Place> places_;
   std::vector<Place> origin_places_;
   std::vector<std::uint32_t> cells_;   // of each point

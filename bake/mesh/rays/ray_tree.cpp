@@ -11,13 +11,13 @@
 namespace modar {
 namespace {
 
-/// Triangles of a leaf. On a bust, 2 and 8 take 1.1 times as long.
+/// Triangles of a leaf. Both 2 and 8 are slower.
 constexpr std::size_t kRayLeaf = 4;
-/// Places at which a split is tried: more cost time at each node, fewer miss the best one. Baking a
-/// bust with its shadow takes 1.40, 1.42 and 1.45 s with 8, 16 and 32.
+/// Places at which a split is tried. More take time at each node, fewer miss the best split. [8,
+/// 32]
 constexpr int kSplitBins = 16;
-/// Nodes in a row whose parts may be uneven: then they are halves, so that the stack has an end.
-/// The same takes 1.49, 1.49 and 1.46 s with 10, 20 and 40, which cost stack.
+/// Consecutive nodes that may split unevenly, before halving bounds the depth. More need a larger
+/// stack. [10, 40]
 constexpr int kUneven = 20;
 constexpr std::size_t kRayStack = 3 * (kUneven + 32) + 1;
 /// Of the model's side: boxes are so much larger than single precision rounds.
@@ -168,7 +168,7 @@ void RayTree::build(std::uint32_t node, const Part& part, int depth) {
         i < count ? kBoxSlack * (1 + std::max(glm::length(box.low), glm::length(box.high))) : 0.0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto a = static_cast<int>(axis);
-      // No ray enters what is no number.
+      // No ray enters a box with NaN.
       constexpr float kNoBox = std::numeric_limits<float>::quiet_NaN();
       nodes_[node].low[axis][i] = i < count ? static_cast<float>(box.low[a] - slack) : kNoBox;
       nodes_[node].high[axis][i] = i < count ? static_cast<float>(box.high[a] + slack) : kNoBox;
@@ -212,7 +212,7 @@ std::optional<RayHit> RayTree::first_hit(const glm::dvec3& origin, const glm::dv
   if (nodes_.empty()) return std::nullopt;
   // Finite: along an axis, infinity times no distance would be no number.
   constexpr float kParallel = 1e-30f;
-  // The origin as it is in single precision, at most and at least: boxes grow by as much.
+  // The origin in single precision, at most and at least: boxes grow by as much.
   std::array<Four, 3> above;
   std::array<Four, 3> below;
   std::array<Four, 3> inverse;

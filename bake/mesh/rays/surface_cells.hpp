@@ -14,12 +14,12 @@ namespace modar {
 /// look to most.
 class SurfaceCells {
  public:
-  /// Positions lie in [-1,1]; there are as many normals, of unit length. Side: of a cell, 1e-4 at
+  /// Positions are in [-1,1]; there are as many normals, of unit length. Side: of a cell, 1e-4 at
   /// least.
   SurfaceCells(std::span<const glm::dvec3> positions, std::span<const glm::vec3> normals,
                double side);
 
-  /// Of each cluster, in the order of their first vertices: where the first one lies, and the mean
+  /// Of each cluster, in the order of their first vertices: where the first one is, and the mean
   /// normal.
   [[nodiscard]] const std::vector<glm::vec3>& positions() const { return positions_; }
   [[nodiscard]] const std::vector<glm::vec3>& normals() const { return normals_; }

@@ -101,7 +101,7 @@ Surface make_surface(const TriMesh& mesh) {
 }
 
 /// A neighbour of the current vertex, once for each triangle that has both.
-struct Spoke {
+struct VertexLink {
   std::uint32_t neighbour = 0;
   std::uint32_t triangle = 0;  ///< number among the vertex's own
   bool leaves = false;         ///< the triangle walks the edge from the vertex to the neighbour
@@ -157,7 +157,7 @@ class LinkReader {
         pairs_.push_back(std::uint64_t{std::min(ahead, behind)} << 32 | std::max(ahead, behind));
       }
     }
-    std::sort(spokes_.begin(), spokes_.end(), [](const Spoke& a, const Spoke& b) {
+    std::sort(spokes_.begin(), spokes_.end(), [](const VertexLink& a, const VertexLink& b) {
       return a.neighbour != b.neighbour ? a.neighbour < b.neighbour : a.triangle < b.triangle;
     });
     std::sort(pairs_.begin(), pairs_.end());
@@ -216,7 +216,7 @@ class LinkReader {
   const Surface& surface_;
   MeshTopology& sums_;
   Part& part_;
-  std::vector<Spoke> spokes_;
+  std::vector<VertexLink> spokes_;
   std::vector<std::uint64_t> pairs_;
   std::vector<std::uint32_t> fans_;
   std::vector<std::uint32_t> numbers_;
@@ -296,7 +296,7 @@ void add_diagnostics(const TriMesh& mesh, const MeshTopology& topology, Report& 
       std::to_string(topology.non_manifold_edges) + " edges have more than two triangles and " +
           std::to_string(topology.non_manifold_vertices) +
           " vertices are where surfaces meet or touch",
-      "they are kept as they are; levels of detail leave them in place");
+      "they are kept unchanged; levels of detail leave them in place");
   add(topology.duplicate_triangles, "model.duplicate-faces",
       std::to_string(topology.duplicate_triangles) + " triangles repeat an earlier one",
       "they are kept; remove them in a modelling program, they cost time and may flicker");
@@ -307,7 +307,7 @@ void add_diagnostics(const TriMesh& mesh, const MeshTopology& topology, Report& 
   add(topology.half_edges->copied_faces, "model.copied-faces",
       std::to_string(topology.half_edges->copied_faces) +
           " faces fit in no half-edge mesh (three at an edge, or turned over)",
-      "levels of detail keep them as they are");
+      "levels of detail keep them unchanged");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Topology of a model's surface: components, boundary loops, what is not manifold.
+// Topology of a model's surface: components, boundary loops, parts that are not manifold.
 #pragma once
 
 #include "bake/mesh/tri_mesh.hpp"

@@ -27,7 +27,7 @@ glm::dvec3 newell_normal(std::span<const glm::dvec3> p) {
   return n;
 }
 
-/// Drops the axis that the normal points along most; the polygon turns left in what is left.
+/// Drops the axis that the normal points along most; the remaining polygon turns left.
 std::vector<glm::dvec2> flatten(std::span<const glm::dvec3> p, const glm::dvec3& normal) {
   const glm::dvec3 a = glm::abs(normal);
   const int drop = a.x > a.y && a.x > a.z ? 0 : (a.y > a.z ? 1 : 2);

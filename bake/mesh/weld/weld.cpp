@@ -1,5 +1,5 @@
-// Polygons to welded triangles in [-1,1]: picks one of two ways, normalises, reports what was
-// dropped or made.
+// Polygons to welded triangles in [-1,1]: picks one of two ways, normalises, reports dropped and
+// created elements.
 #include "bake/mesh/weld/weld.hpp"
 
 #include <algorithm>
@@ -17,6 +17,7 @@
 #include <glm/vec3.hpp>
 
 #include "bake/import/source_model.hpp"
+#include "bake/mesh/weld/normals.hpp"
 #include "bake/mesh/weld/triangulate.hpp"
 #include "formats/base/parallel.hpp"
 
@@ -24,11 +25,10 @@ namespace modar {
 namespace {
 
 struct WeldCounts {
-  std::uint64_t flat = 0;         ///< triangles without area
-  std::uint64_t not_finite = 0;   ///< triangles with a nan
-  std::uint64_t tangled = 0;      ///< polygons
-  std::uint64_t bad_normals = 0;  ///< corners whose normal has no direction
-  std::uint64_t made_normals = 0;
+  std::uint64_t flat = 0;        ///< triangles without area
+  std::uint64_t not_finite = 0;  ///< triangles with a nan
+  std::uint64_t tangled = 0;     ///< polygons
+  MadeNormals normals;
 };
 
 /// Twice the area vector of a triangle, in doubles.
@@ -38,12 +38,6 @@ glm::dvec3 area_vector(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec
 
 bool is_finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-/// Does a source normal have a direction?
-bool has_direction(const glm::vec3& n) {
-  const float square = glm::dot(n, n);
-  return square > 1e-30f && square < 1e30f;
 }
 
 /// Flips v; non-finite coordinates become the image's corner.
@@ -57,137 +51,6 @@ glm::u8vec4 byte_colour(const glm::vec3& colour) {
   const glm::vec3 c = colour * 255.0f + 0.5f;
   return {static_cast<std::uint8_t>(c.x), static_cast<std::uint8_t>(c.y),
           static_cast<std::uint8_t>(c.z), std::uint8_t{255}};
-}
-
-/// What a triangle adds to the normals of its corners: its area vector times the angle there, so
-/// that neither thin nor many triangles of one flat side tilt the normal (Max, "Weights for
-/// computing vertex normals from facet normals", 1999, for the area; Thuermer and Wuethrich, 1998,
-/// for the angle). Many triangles at a time, two angles in one instruction.
-class TriangleShares {
- public:
-  /// Triangles at a time: what they need fills half of a first-level cache. Of 16 to 256, which
-  /// differ by less than their noise.
-  static constexpr std::size_t kMost = 128;
-
-  /// Sets triangle i of a batch. area: area_vector() of its corners.
-  void set(std::size_t i, const glm::dvec3& area, const glm::dvec3& p0, const glm::dvec3& p1,
-           const glm::dvec3& p2) {
-    const glm::dvec3 e01 = p1 - p0;
-    const glm::dvec3 e02 = p2 - p0;
-    const glm::dvec3 e12 = p2 - p1;
-    area_[i] = area;
-    sine_[i] = glm::length(area);
-    cosine_[0][i] = glm::dot(e01, e02);
-    cosine_[1][i] = -glm::dot(e12, e01);
-    cosine_[2][i] = glm::dot(e02, e12);
-  }
-  /// Computes the shares of the first `count` triangles.
-  void compute(std::size_t count);
-  /// After compute().
-  [[nodiscard]] glm::dvec3 at(std::size_t i, std::size_t corner) const {
-    return area_[i] * angle_[corner][i];
-  }
-
- private:
-  using Values = std::array<double, kMost>;
-  std::array<glm::dvec3, kMost> area_;
-  Values sine_{};                   // times the lengths of the two sides, as the cosines are
-  std::array<Values, 3> cosine_{};  // of each corner
-  std::array<Values, 3> angle_;
-};
-
-/// Two doubles in one register, with the operators of one.
-using Pair = double __attribute__((vector_size(16)));
-
-/// atan2(sine, cosine) for sines of 0 or more, off by 2e-8 at most (Abramowitz and Stegun, 4.4.49):
-/// a weight needs no more, and libm's took a tenth of the bake of a scan without normals. Without
-/// branches, which random angles would mispredict.
-Pair angles_of(Pair sine, Pair cosine) {
-  const Pair width = cosine < 0.0 ? -cosine : cosine;
-  const Pair greater = sine < width ? width : sine;
-  const Pair lesser = width < sine ? width : sine;
-  const Pair x = lesser / greater;
-  const Pair s = x * x;
-  Pair angle = s * 0.0028662257 + -0.0161657367;
-  for (const double factor : {0.0429096138, -0.0752896400, 0.1065626393, -0.1420889944,
-                              0.1999355085, -0.3333314528, 1.0}) {
-    angle = angle * s + factor;
-  }
-  angle *= x;
-  constexpr double kPi = 3.141592653589793;
-  angle = sine > width ? kPi / 2 - angle : angle;
-  angle = cosine < 0.0 ? kPi - angle : angle;
-  return greater > 0.0 ? angle : greater;
-}
-
-void TriangleShares::compute(std::size_t count) {
-  for (std::size_t corner = 0; corner < 3; ++corner) {
-    for (std::size_t i = 0; i < count; i += 2) {
-      Pair sine;
-      Pair cosine;
-      std::memcpy(&sine, &sine_[i], sizeof sine);
-      std::memcpy(&cosine, &cosine_[corner][i], sizeof cosine);
-      const Pair angle = angles_of(sine, cosine);
-      std::memcpy(&angle_[corner][i], &angle, sizeof angle);
-    }
-  }
-}
-
-/// Unit normals of sums of shares; (0, 0, 1) where the shares cancel. In the memory of the sums.
-Array<glm::vec3> to_normals(Array<glm::dvec3>&& sums) {
-  const std::size_t count = sums.size();
-  auto* const bytes = reinterpret_cast<unsigned char*>(sums.data());
-  for (std::size_t v = 0; v < count; ++v) {
-    const glm::dvec3 sum = sums[v];
-    const double length = glm::length(sum);
-    const glm::vec3 normal(length > 0 && std::isfinite(length) ? sum / length
-                                                               : glm::dvec3(0, 0, 1));
-    // Ends where the next sum begins, or before.
-    std::memcpy(bytes + v * sizeof normal, &normal, sizeof normal);
-  }
-  Array<glm::vec3> normals = Array<glm::vec3>::split(std::move(sums));
-  normals.resize(count);
-  normals.shrink();
-  return normals;
-}
-
-/// Collects the faces around each (position, smoothing group); group 0 makes flat faces.
-class NormalMaker {
- public:
-  /// Number of the normal shared by the corners of this position and group; made on first use.
-  std::uint32_t node(std::uint32_t position, std::uint32_t group, std::size_t position_count);
-  /// Number of a normal that belongs to one face.
-  std::uint32_t flat_node();
-  /// Adds a triangle's share to one corner.
-  void add(std::uint32_t node, const glm::dvec3& share) { sums_[node] += share; }
-  /// Normals by number.
-  [[nodiscard]] Array<glm::vec3> take_normals() { return to_normals(std::move(sums_)); }
-
- private:
-  Array<std::uint32_t> first_;  // of each position, kNoIndex where none
-  Array<std::uint32_t> next_;   // of each node
-  Array<std::uint32_t> group_;
-  Array<glm::dvec3> sums_;
-};
-
-std::uint32_t NormalMaker::node(std::uint32_t position, std::uint32_t group,
-                                std::size_t position_count) {
-  if (first_.empty()) first_.assign(position_count, kNoIndex);
-  for (std::uint32_t n = first_[position]; n != kNoIndex; n = next_[n]) {
-    if (group_[n] == group) return n;
-  }
-  const std::uint32_t n = flat_node();
-  next_[n] = first_[position];
-  group_[n] = group;
-  first_[position] = n;
-  return n;
-}
-
-std::uint32_t NormalMaker::flat_node() {
-  sums_.push_back(glm::dvec3(0.0));
-  next_.push_back(kNoIndex);
-  group_.push_back(0);
-  return static_cast<std::uint32_t>(sums_.size() - 1);
 }
 
 /// Numbers distinct (position, uv, normal) triples by first use, in a list per position: corners
@@ -255,10 +118,7 @@ std::uint32_t VertexWeld::from_hub(const Corner& key) {
 
 // The general way: polygons, seams, missing and made normals.
 
-/// Flags a made normal's number in a vertex key; numbers of source normals are below it.
-constexpr std::uint32_t kMade = 0x80000000u;
-
-/// Runs over the faces once: triangulates, drops, gathers normals, welds.
+/// Runs over the faces once: triangulates, drops, welds.
 class Welder {
  public:
   Welder(SourceModel& source, TriMesh& mesh, WeldCounts& counts)
@@ -266,15 +126,13 @@ class Welder {
 
   void run() {
     const std::size_t faces = source_.face_count();
-    // One triangle a face, two less than corners in all: exact but for what is dropped.
+    // One triangle a face, two less than corners in all: exact except for dropped triangles.
     const std::size_t triangles = source_.corner_count() - 2 * faces;
     mesh_.triangles.reserve(triangles);
     mesh_.triangle_material.reserve(triangles);
     RunCursor materials(source_.material_runs);
-    RunCursor smoothing(source_.smoothing_runs);
     for (std::size_t f = 0; f < faces; ++f) {
       material_ = materials.at(f);
-      smoothing_ = smoothing.at(f);
       face(f);
     }
   }
@@ -311,11 +169,8 @@ class Welder {
 
  private:
   void fill_normals(const Array<Corner>& keys) {
-    const Array<glm::vec3> made = normals_.take_normals();
-    counts_.made_normals = made.size();
     for (std::size_t v = 0; v < keys.size(); ++v) {
-      const std::uint32_t n = keys[v].normal;
-      mesh_.normals[v] = (n & kMade) != 0 ? made[n & ~kMade] : glm::normalize(source_.normals[n]);
+      mesh_.normals[v] = glm::normalize(source_.normals[keys[v].normal]);
     }
   }
 
@@ -333,7 +188,6 @@ class Welder {
   void face(std::size_t f) {
     const std::size_t first = source_.face_first(f);
     const std::size_t count = source_.face_size(f);
-    flat_ = kNoIndex;
     if (count == 3) {
       triangle(first, {0, 1, 2});
       return;
@@ -364,47 +218,16 @@ class Welder {
       return;
     }
     std::array<std::uint32_t, 3> out{};
-    bool computed = false;
-    for (std::size_t i = 0; i < 3; ++i) {
-      Corner& key = corners[i];
-      if (!has_normal(key)) {
-        if (!computed) {
-          shares_.set(0, area, p[0], p[1], p[2]);
-          shares_.compute(1);
-          computed = true;
-        }
-        const std::uint32_t node = normal_node(key.position);
-        normals_.add(node, shares_.at(0, i));
-        key.normal = kMade | node;
-      }
-      out[i] = weld_.vertex(key);
-    }
+    for (std::size_t i = 0; i < 3; ++i) out[i] = weld_.vertex(corners[i]);
     mesh_.triangles.push_back(out);
     mesh_.triangle_material.push_back(material_);
-  }
-
-  bool has_normal(const Corner& corner) {
-    if (corner.normal == kNoIndex) return false;
-    if (has_direction(source_.normals[corner.normal])) return true;
-    ++counts_.bad_normals;
-    return false;
-  }
-
-  std::uint32_t normal_node(std::uint32_t position) {
-    if (smoothing_ != 0) return normals_.node(position, smoothing_, source_.positions.size());
-    if (flat_ == kNoIndex) flat_ = normals_.flat_node();
-    return flat_;
   }
 
   SourceModel& source_;
   TriMesh& mesh_;
   WeldCounts& counts_;
   VertexWeld weld_;
-  NormalMaker normals_;
-  TriangleShares shares_;
   std::uint32_t material_ = 0;
-  std::uint32_t smoothing_ = 0;
-  std::uint32_t flat_ = kNoIndex;  // the normal of the face at hand, where it is flat
   std::vector<glm::dvec3> polygon_;
   std::vector<std::array<std::uint32_t, 3>> triangles_;
 };
@@ -490,14 +313,20 @@ void keep_elements(Array<T>& values, const Array<std::uint8_t>& used) {
   values.shrink();
 }
 
-/// Removes positions that no triangle uses; `to` holds the new numbers of the others.
-void drop_unused(SourceModel& source, const Array<std::uint8_t>& used, TriMesh& mesh) {
-  if (std::find(used.begin(), used.end(), std::uint8_t{0}) == used.end()) return;
+/// Removes positions that no triangle uses; `to` holds the new numbers of the others. copies: the
+/// position that each of the last ones is a copy of.
+void drop_unused(SourceModel& source, const Array<std::uint8_t>& used,
+                 const Array<std::uint32_t>& copies, TriMesh& mesh) {
+  const bool all = std::find(used.begin(), used.end(), std::uint8_t{0}) == used.end();
+  if (all && copies.empty()) return;
+  const std::size_t own = used.size() - copies.size();
   Array<std::uint32_t> to(used.size());
   for (std::size_t i = 0; i < used.size(); ++i) {
     to[i] = static_cast<std::uint32_t>(mesh.source_positions.size());
-    if (used[i] != 0) mesh.source_positions.push_back(static_cast<std::uint32_t>(i));
+    if (used[i] == 0) continue;
+    mesh.source_positions.push_back(i < own ? static_cast<std::uint32_t>(i) : copies[i - own]);
   }
+  if (all) return;
   for (std::uint32_t& v : source.corner_positions) v = to[v];
   keep_elements(source.positions, used);
   keep_elements(source.normals, used);
@@ -505,65 +334,21 @@ void drop_unused(SourceModel& source, const Array<std::uint8_t>& used, TriMesh& 
   keep_elements(source.colours, used);
 }
 
-/// A normal for each position, for sources without normals.
-void make_normals(const SourceModel& source, TriMesh& mesh, WeldCounts& counts) {
-  Array<glm::dvec3> sums(source.positions.size(), glm::dvec3(0.0));
-  TriangleShares shares;
-  for (std::size_t first = 0; first < mesh.triangles.size(); first += TriangleShares::kMost) {
-    const std::size_t count = std::min(TriangleShares::kMost, mesh.triangles.size() - first);
-    const std::array<std::uint32_t, 3>* const triangles = mesh.triangles.data() + first;
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto& [a, b, c] = triangles[i];
-      const glm::dvec3& p0 = source.positions[a];
-      const glm::dvec3& p1 = source.positions[b];
-      const glm::dvec3& p2 = source.positions[c];
-      shares.set(i, area_vector(p0, p1, p2), p0, p1, p2);
-    }
-    shares.compute(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      for (std::size_t corner = 0; corner < 3; ++corner) {
-        sums[triangles[i][corner]] += shares.at(i, corner);
-      }
-    }
-  }
-  mesh.normals = to_normals(std::move(sums));
-  counts.made_normals = mesh.normals.size();
-}
-
-bool has_identity_indices(const SourceModel& source) {
-  using Kind = IndexPlane::Kind;
-  if (!source.first_corner.empty() || source.corner_uvs.kind == Kind::kOwn) return false;
-  if (source.corner_uvs.kind == Kind::kSame && source.uvs.size() < source.positions.size()) {
-    return false;
-  }
-  if (source.corner_normals.kind == Kind::kSame) {
-    return source.normals.size() >= source.positions.size() &&
-           std::all_of(source.normals.begin(), source.normals.end(), has_direction);
-  }
-  return source.corner_normals.kind == Kind::kAbsent && source.smoothing_runs.size() == 1 &&
-         source.smoothing_runs[0].value != 0;
-}
-
 void weld_identity_indices(SourceModel& source, TriMesh& mesh, WeldCounts& counts, unsigned jobs) {
   if (source.corner_uvs.kind == IndexPlane::Kind::kAbsent) source.uvs.release();
-  if (source.corner_normals.kind == IndexPlane::Kind::kAbsent) source.normals.release();
   // No corner refers to elements beyond the last position.
   if (!source.uvs.empty()) source.uvs.resize(source.positions.size());
-  if (!source.normals.empty()) source.normals.resize(source.positions.size());
+  source.normals.resize(source.positions.size());
   Array<std::uint8_t> used;
   keep_triangles(source, classify(source, used, jobs), mesh, counts);
   if (mesh.triangle_material.empty()) return;
-  drop_unused(source, used, mesh);
+  drop_unused(source, used, counts.normals.from, mesh);
   used.release();
   mesh.triangles = Array<std::array<std::uint32_t, 3>>::regroup(std::move(source.corner_positions));
-  if (source.normals.empty()) {
-    make_normals(source, mesh, counts);
-  } else {
-    mesh.normals = std::move(source.normals);
-    parallel_stretches(mesh.normals.size(), jobs, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t v = begin; v < end; ++v) mesh.normals[v] = glm::normalize(mesh.normals[v]);
-    });
-  }
+  mesh.normals = std::move(source.normals);
+  parallel_stretches(mesh.normals.size(), jobs, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) mesh.normals[v] = glm::normalize(mesh.normals[v]);
+  });
   mesh.uvs = std::move(source.uvs);
   for (glm::dvec2& uv : mesh.uvs) uv = image_uv(uv);
   mesh.colours.resize(source.colours.size());
@@ -576,7 +361,10 @@ void weld_identity_indices(SourceModel& source, TriMesh& mesh, WeldCounts& count
 
 // Picking the way, and what both share.
 
-/// Brings the positions into [-1,1]; the model's largest side fills it.
+constexpr double kLeastFloat = std::numeric_limits<float>::min();
+
+/// Normalises the positions to [-1,1]; the model's largest side fills it. Coordinates below
+/// the smallest normal float become zero.
 void normalise(TriMesh& mesh) {
   glm::dvec3 low(std::numeric_limits<double>::infinity());
   glm::dvec3 high(-low);
@@ -592,6 +380,7 @@ void normalise(TriMesh& mesh) {
   mesh.placement.scale = std::max({half.x, half.y, half.z});
   for (glm::dvec3& p : mesh.positions) {
     p = glm::clamp((p - mesh.placement.center) / mesh.placement.scale, -1.0, 1.0);
+    for (int i = 0; i < 3; ++i) p[i] = std::fabs(p[i]) < kLeastFloat ? 0.0 : p[i];
   }
 }
 
@@ -630,10 +419,32 @@ void report_counts(const std::string& name, const WeldCounts& counts, std::size_
   add(counts.tangled, "model.tangled-polygon", DiagnosticSeverity::kWarning,
       "polygons intersect themselves or are too large to triangulate well",
       "triangulate the model before export");
-  add(counts.bad_normals, "model.bad-normal", DiagnosticSeverity::kInfo,
+  add(counts.normals.bad, "model.bad-normal", DiagnosticSeverity::kInfo,
       "corners have a normal of length 0", "normals were computed for them");
-  add(counts.made_normals, "model.made-normals", DiagnosticSeverity::kInfo,
-      "normals were computed from the faces", "");
+  add(counts.normals.made, "model.made-normals", DiagnosticSeverity::kInfo,
+      counts.normals.noise ? "normals were computed from the faces; most sharp edges end in "
+                             "nothing, as the noise of scans does, and are smoothed"
+                           : "normals were computed from the faces",
+      "");
+}
+
+/// Shares of a file's faces whose loss is reported last, and is an error.
+constexpr double kToldLoss = 0.05;
+constexpr double kFatalLoss = 0.5;
+
+Result<void> account_for_faces(const std::string& name, std::uint64_t lost, std::uint64_t all,
+                               Report& report) {
+  const double share = all == 0 ? 0 : static_cast<double>(lost) / static_cast<double>(all);
+  const std::string what =
+      std::to_string(lost) + " of " + std::to_string(all) + " faces could not be used";
+  const char* const cure = "export the model again; the notes above name their faults";
+  if (share > kFatalLoss) {
+    return fail(ExitCode::kInvalidInput, "model.mostly-lost", name, what, cure);
+  }
+  if (share > kToldLoss) {
+    report.diagnostics.push_back({"model.lost", DiagnosticSeverity::kWarning, name, 0, what, cure});
+  }
+  return {};
 }
 
 }  // namespace
@@ -646,16 +457,17 @@ Result<TriMesh> weld(SourceModel&& source, Report& report, const WeldOptions& op
   mesh.source_vertex_count = source.positions.size();
   mesh.source_face_count = source.face_count();
   WeldCounts counts;
+  counts.normals = make_normals(source, options.crease);
   if (has_identity_indices(source)) {
     weld_identity_indices(source, mesh, counts, options.jobs);
   } else {
     weld_any(source, mesh, counts);
   }
   if (mesh.triangles.empty()) {
-    return fail(ExitCode::kInvalidInput, "model.empty", source.name,
-                "no triangle is left: all faces have no area or non-finite vertices",
-                "check the model in a viewer and export it again");
+    return no_triangle_left(source.name, "all faces have no area or non-finite vertices");
   }
+  MODAR_TRY(account_for_faces(source.name, source.lost_faces + counts.not_finite,
+                              source.lost_faces + mesh.source_face_count, report));
   normalise(mesh);
   keep_used_materials(source, mesh);
   report_counts(source.name, counts, mesh.triangles.size(), report);

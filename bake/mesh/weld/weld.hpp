@@ -8,11 +8,12 @@
 namespace modar {
 
 struct WeldOptions {
-  unsigned jobs = 1;  ///< threads; the result does not depend on it
+  unsigned jobs = 1;   ///< threads; the result does not depend on it
+  double crease = 40;  ///< degrees between faces above which an edge is sharp, see make_normals()
 };
 
 /// Triangulates (concave polygons by ear clipping), drops what has no area, welds on index triples,
-/// makes missing normals (area-and-angle weighted, smoothing groups respected), normalises to
+/// makes missing normals (see make_normals()), normalises to
 /// [-1,1]. Diagnostics of dropped triangles and made normals go to report.diagnostics. Errors:
 /// kInvalidInput "model.empty" where no triangle is left. The overload that takes ownership frees
 /// the source's arrays as it goes: large models need half the memory.

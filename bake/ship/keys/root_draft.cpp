@@ -14,12 +14,12 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMostDraftBytes = 4096;  // what devices read of such a document
 
-std::string describe(const RootWord& word, const PublicKey& key) {
+std::string describe(const RootMetadata& word, const PublicKey& key) {
   return "epoch " + std::to_string(word.epoch) + ": key " + to_hex(key.id) +
          " signs releases, behind link " + std::to_string(word.links) + " of the chain of keys";
 }
 
-std::string describe(const RootLink& link) {
+std::string describe(const RootRotation& link) {
   std::string text = "link " + std::to_string(link.serial) +
                      " of the chain of root keys: " + std::to_string(link.roots.threshold) +
                      " of " + std::to_string(link.roots.keys.size()) + " must agree from now on:";
@@ -27,7 +27,7 @@ std::string describe(const RootLink& link) {
   return text;
 }
 
-/// Files beside a file, whatever folder the paths name.
+/// Files next to a file, whatever folder the paths name.
 SignatureReader beside(const std::string& file) {
   const fs::path path(file);
   const std::string folder = path.has_parent_path() ? path.parent_path().string() : ".";
@@ -42,17 +42,17 @@ tl::unexpected<Error> stale(const std::string& file, const std::string& cause) {
 
 }  // namespace
 
-Result<RootDraft> draft_root_word(const ReleaseFolder& folder, const PublicKey& next) {
-  MODAR_ASSIGN(RootWord word, folder.root_word());
+Result<RootDraft> draft_root_metadata(const ReleaseFolder& folder, const PublicKey& next) {
+  MODAR_ASSIGN(RootMetadata word, folder.root_metadata());
   ++word.epoch;
-  word.links = folder.key_links();
+  word.links = folder.key_rotations();
   word.key = public_key_line(next);
-  return RootDraft{"root.json", root_word_text(word), describe(word, next)};
+  return RootDraft{"root.json", root_metadata_text(word), describe(word, next)};
 }
 
-RootDraft draft_root_link(const ReleaseFolder& folder, const RootSet& roots) {
-  const RootLink link{folder.root_links() + 1, roots};
-  return {root_link_path(link.serial), root_link_text(link), describe(link)};
+RootDraft draft_root_rotation(const ReleaseFolder& folder, const RootSet& roots) {
+  const RootRotation link{folder.root_rotations() + 1, roots};
+  return {root_rotation_path(link.serial), root_rotation_text(link), describe(link)};
 }
 
 Result<RootDraft> read_root_draft(const std::string& file) {
@@ -60,12 +60,12 @@ Result<RootDraft> read_root_draft(const std::string& file) {
   if (!text) {
     return fail(ExitCode::kIo, "io.open", file, "there is no such file", "check the path");
   }
-  if (const auto word = parse_root_word(*text)) {
+  if (const auto word = parse_root_metadata(*text)) {
     MODAR_ASSIGN(const auto key, parse_public_key(word->key));
     return RootDraft{"root.json", *text, describe(*word, key)};
   }
-  if (const auto link = parse_root_link(*text)) {
-    return RootDraft{root_link_path(link->serial), *text, describe(*link)};
+  if (const auto link = parse_root_rotation(*text)) {
+    return RootDraft{root_rotation_path(link->serial), *text, describe(*link)};
   }
   return fail(ExitCode::kInvalidInput, "ship.draft", file,
               "it names neither a signing key nor new root keys",
@@ -92,16 +92,16 @@ Result<RootDraft> accept_root_draft(const ReleaseFolder& folder, const std::stri
   MODAR_TRY(verify_root_signatures(file, draft.text, roots, read));
   std::vector<PublicKey> signers = roots.keys;
   if (draft.path == "root.json") {
-    MODAR_ASSIGN(const auto word, parse_root_word(draft.text));
-    MODAR_ASSIGN(const auto before, folder.root_word());
-    if (word.epoch != before.epoch + 1 || word.links != folder.key_links()) {
+    MODAR_ASSIGN(const auto word, parse_root_metadata(draft.text));
+    MODAR_ASSIGN(const auto before, folder.root_metadata());
+    if (word.epoch != before.epoch + 1 || word.links != folder.key_rotations()) {
       return stale(file, "the folder has come to epoch " + std::to_string(before.epoch) +
-                             " and link " + std::to_string(folder.key_links()) + " since");
+                             " and link " + std::to_string(folder.key_rotations()) + " since");
     }
   } else {
-    MODAR_ASSIGN(const auto link, parse_root_link(draft.text));
-    if (link.serial != folder.root_links() + 1) {
-      return stale(file, "the folder has come to link " + std::to_string(folder.root_links()) +
+    MODAR_ASSIGN(const auto link, parse_root_rotation(draft.text));
+    if (link.serial != folder.root_rotations() + 1) {
+      return stale(file, "the folder has come to link " + std::to_string(folder.root_rotations()) +
                              " of the root keys since");
     }
     MODAR_TRY(verify_root_signatures(file, draft.text, link.roots, read));

@@ -21,30 +21,28 @@
 namespace modar {
 namespace {
 
-/// Pixels of a picture that a cell is wide: finer cells cut closer, and take longer. A bundle of a
-/// scan with five photos has 5.33 MB with 8, and 5.65 with 4 and with 16.
+/// Pixels of a picture that a cell is wide. Finer cells cut closer and take longer. [4, 16]
 constexpr std::uint32_t kCell = 8;
 /// Cells along a side at most: a picture of 16,384 has cells of 32.
 constexpr std::uint32_t kMostCells = 512;
-/// Texels in the bytes of a vertex of 16 bytes; ETC1 with its mips takes 2/3 of a byte.
+/// Texels of ETC1 with mip levels in the bytes of one vertex.
 constexpr double kVertexTexels = 24;
-/// Around each part, texels: mip level n mixes 2^n texels, so that 4 keep two levels clean, and the
-/// third nearly. The widest that fits is taken; level 0's blocks of 4x4 want the least of them.
+/// Texels around each part; the widest that fits is used. Wider keep more mip levels clean and
+/// waste more of a page.
 constexpr std::array<std::uint32_t, 3> kGutters = {16, 8, 4};
 /// Blocks of textures: parts begin on them.
 constexpr std::uint32_t kBlock = 4;
-/// The gutter that cuts are weighed with: less than the least leaves small parts, which fill pages
-/// better (a scan of five photos: 157 parts and 2,374 vertices more, not 119 and 2,153, and a page
-/// of half the size).
+/// Texels of gutter in a cut's price. Fewer leave small parts, which fill pages better and need
+/// more vertices.
 constexpr double kCutGutter = 2;
 /// Steps between the least density and the pictures' own.
 constexpr int kScaleSteps = 8;
-/// What is done unasked saves so much, and costs no more decibels beside pictures apart: some have
-/// more texels apart than pixels (a side of 728 becomes 1024), which an atlas does not keep. Set by
-/// hand; the scan of five photos loses 1.2, of which 0.01 beside pictures apart of its own density
-/// (36.34 dB and 36.35).
+/// Largest share of the bytes that an automatic atlas may keep. Higher makes atlases for little
+/// gain.
 constexpr double kWorthBytes = 2.0 / 3;
+// The same of the materials.
 constexpr double kWorthDraws = 0.5;
+// Decibels that an automatic atlas may lose, compared with separate pictures.
 constexpr double kMostLoss = 1.5;
 
 /// A picture of the mesh.
@@ -63,14 +61,14 @@ struct Sheet {
   }
 };
 
-/// A rectangle of a sheet: the uvs of the triangles that lie there.
+/// A rectangle of a sheet: the uvs of the triangles there.
 struct Part {
   std::uint32_t sheet = 0;
   glm::dvec2 low{1e9};
   glm::dvec2 high{-1e9};
 };
 
-/// The part's texels on a sheet of this size, gutters among them; they may lie beyond its edges.
+/// The part's texels on a sheet of this size, gutters among them; they may be beyond its edges.
 struct PartTexels {
   std::int64_t left = 0;
   std::int64_t top = 0;
@@ -93,7 +91,7 @@ PartTexels texels_of_part(const Part& part, AtlasSize sheet, std::uint32_t gutte
 struct Plan {
   std::vector<Sheet> sheets;
   std::vector<Part> parts;
-  std::vector<std::uint32_t> part_of;  ///< of each triangle; kNone: stays as it is
+  std::vector<std::uint32_t> part_of;  ///< of each triangle; kNone: stays unchanged
   int step = 0;                        ///< of Sheet::scaled()
   std::uint32_t gutter = 0;
   AtlasPages layout;
@@ -204,7 +202,7 @@ bool place_parts(std::uint32_t max_side, Plan& plan) {
   return true;
 }
 
-/// Squared differences of what is shown.
+/// Squared differences of the visible texels.
 struct Loss {
   double squares = 0;
   std::uint64_t count = 0;
@@ -362,10 +360,10 @@ bool differ_in_picture_only(const SourceMaterial& a, const SourceMaterial& b) {
          a.occluder() == b.occluder();
 }
 
-/// The materials once the parts lie on pages, and those of the triangles.
+/// The materials once the parts are on pages, and those of the triangles.
 struct Materials {
   std::vector<SourceMaterial> materials;
-  std::vector<std::uint32_t> pages;  ///< of each, kNone: as it was
+  std::vector<std::uint32_t> pages;  ///< of each, kNone: unchanged
   std::vector<std::uint32_t> uses;   ///< of those that stay
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> number;  ///< of old and page
 };
@@ -429,16 +427,16 @@ double draws_of(std::size_t materials, const TriMesh& mesh) {
                   static_cast<double>(vertices) / chunk_vertices_for(vertices));
 }
 
-Diagnostic tell_atlas(const Plan& plan, const Pages& pages, double bytes, std::size_t doubled,
-                      const TriMesh& mesh) {
+Diagnostic report_atlas(const Plan& plan, const Pages& pages, double bytes, std::size_t doubled,
+                        const TriMesh& mesh) {
   const AtlasSize page = plan.layout.pages.front();
   char text[320];
-  int length = std::snprintf(
-      text, sizeof text,
-      "what is shown of %zu pictures lies on %zu of %u x %u in %zu parts, %u texels or more apart: "
-      "%.0f %% of the bytes, %zu vertices more",
-      plan.sheets.size(), plan.layout.pages.size(), page.width, page.height, plan.parts.size(),
-      2 * plan.gutter, 100 * bytes, doubled);
+  int length = std::snprintf(text, sizeof text,
+                             "the visible parts of %zu pictures are on %zu of %u x %u in %zu "
+                             "parts, %u texels or more apart: "
+                             "%.0f %% of the bytes, %zu vertices more",
+                             plan.sheets.size(), plan.layout.pages.size(), page.width, page.height,
+                             plan.parts.size(), 2 * plan.gutter, 100 * bytes, doubled);
   if (pages.atlas.count == 0) {
     std::snprintf(text + length, sizeof text - static_cast<std::size_t>(length),
                   "; its texels are the pictures' own");
@@ -484,7 +482,7 @@ void take_atlas(const Plan& plan, Pages pages, double bytes, Materials merged, T
   mesh.materials = std::move(merged.materials);
   uses = std::move(merged.uses);
   report.diagnostics.push_back(
-      tell_atlas(plan, pages, bytes, mesh.positions.size() - vertices, mesh));
+      report_atlas(plan, pages, bytes, mesh.positions.size() - vertices, mesh));
 }
 
 /// The pictures of the mesh that may be repacked.

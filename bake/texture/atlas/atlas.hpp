@@ -28,7 +28,7 @@ struct AtlasOptions {
 /// that the picture has there and with a gutter of 4, 8 or 16 texels, as wide as the page allows;
 /// being convex, it also holds every coarser level of detail of its triangles. Where it pays: two
 /// pictures or more, a third of the bytes or half of the materials less, and a loss by resampling
-/// of 1.5 dB at most beside the pictures apart. What was done, and its loss, is diagnostic
+/// of 1.5 dB at most, compared with separate pictures. The change and its loss are diagnostic
 /// "texture.atlas". uses: of the mesh's materials, as collect_textures() gave them. Errors: those
 /// of read_image().
 Result<void> make_atlases(const AtlasOptions& options, TriMesh& mesh,

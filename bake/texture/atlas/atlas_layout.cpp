@@ -97,7 +97,7 @@ class BoxCutter {
         const std::int32_t before = i == 0    ? AtlasCells::kNotShown
                                     : columns ? at(x - 1, y)
                                               : at(x, y - 1);
-        // Of n vertices that are spread over a square, the root of n lie along one side.
+        // Of n vertices that are spread over a square, the root of n are along one side.
         if (before != AtlasCells::kNotShown) lines[i].cut += std::sqrt(0.5 * (here + before)) + 1;
       }
     }
@@ -166,7 +166,7 @@ class Page {
   }
 
  private:
-  /// Takes a box out of what is free.
+  /// Takes a box out of the free space.
   void take(const AtlasBox& used) {
     std::vector<AtlasBox> kept;
     std::vector<AtlasBox> pieces;
@@ -201,7 +201,7 @@ class Page {
   std::vector<AtlasBox> free_;
 };
 
-/// What is placed first. A page that one order does not fill, another one may: all are tried.
+/// The order of placement. A page that one order does not fill, another one may: all are tried.
 enum class Order : std::uint8_t { kLongest, kLargest, kWidestAround };
 constexpr Order kOrders[] = {Order::kLongest, Order::kLargest, Order::kWidestAround};
 

@@ -1,4 +1,5 @@
-// Where parts of pictures go on shared pages: cuts into rectangles, and a packer of rectangles.
+// The places of parts of pictures on shared pages: cuts into rectangles, and a packer of
+// rectangles.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +22,7 @@ struct AtlasBox {
   std::uint32_t bottom = 0;
 };
 
-/// A picture in square cells, top row first: how many vertices of triangles lie in each, where
+/// A picture in square cells, top row first: how many vertices of triangles are in each, where
 /// triangles show any of it.
 struct AtlasCells {
   static constexpr std::int32_t kNotShown = -1;

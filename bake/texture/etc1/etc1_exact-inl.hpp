@@ -195,7 +195,7 @@ HWY_INLINE void free_bounds(HalfSite& site) {
   }
 }
 
-/// Differential mode: the colour must lie from `below` to `above` the other half's.
+/// Differential mode: the colour must be from `below` to `above` the other half's.
 HWY_INLINE void bounds_around(V colour, std::int32_t below, std::int32_t above, HalfSite& site) {
   const V q[3] = {red_of(colour), green_of(colour), blue_of(colour)};
   for (std::size_t c = 0; c < 3; ++c) {
@@ -237,8 +237,8 @@ HWY_NOINLINE void try_fit(const HalfSite& site, V colour, V table, HalfFit& fit)
   keep_fit(hn::And(legal, hn::Lt(error, load(fit.error))), error, colour, table, fit);
 }
 
-/// Steps of one value in one, three and two channels of a packed colour. A channel that leaves its
-/// byte changes the next, and within() finds it out of bounds itself: 0 - 1 leaves 255.
+/// Steps of one value in the channels of a packed colour. A channel that overflows changes the
+/// next; within() rejects it.
 inline constexpr std::int32_t kColourSteps[] = {0x000001, 0x000100, 0x010000, 0x010101,
                                                 0x000101, 0x010100, 0x010001};
 

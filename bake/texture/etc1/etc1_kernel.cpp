@@ -26,7 +26,7 @@ HWY_INLINE V reach_of(const HalfStats& stats, const Etc1Search& search) {
                     : reach_of(stats, search.reach4, search.spread4);
 }
 
-/// Brings pairs of colours that differ too much within the steps of differential mode: the better
+/// Clamps pairs of colours that differ too much to the steps of differential mode: the better
 /// of keeping the first and bounding the second, or the other way round.
 template <class W>
 HWY_NOINLINE void bound_differential(const Etc1Search& search, HalfSite (&site)[2],
@@ -88,7 +88,7 @@ HWY_NOINLINE void quick_mode(const Etc1Search& search, HalfSite (&site)[2], Choi
               choice);
 }
 
-/// Black beside white in any mixture: base colours of middle brightness with the largest table
+/// Black and white in any mixture: base colours of middle brightness with the largest table
 /// reach both by clamping, which no estimate sees. Tries them where a half's brightness spans more
 /// than 200 of 255. Black and white drawings (`modar-lab bench etc1`, `fast`): exact from 100 to
 /// 200, 28 to 38 dB without; with a noise of 8 added 44.2 and 38.7 dB. Photos are the same without.

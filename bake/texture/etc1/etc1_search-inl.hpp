@@ -5,7 +5,7 @@
 //   W * sum_c w_c (p_c - B_c - m)^2 = sum_{c<d} w_c w_d ((p_c - B_c) - (p_d - B_d))^2 + (s - W
 //   m)^2, s = sum_c w_c (p_c - B_c).
 // So modifiers compete in one dimension, and for given modifiers each channel of the best B is the
-// value nearest to the half's mean less the modifiers' mean: all colours that can be best lie on
+// value nearest to the half's mean less the modifiers' mean: all colours that can be best are on
 // the path that the nearest values take while that mean moves. sweep() walks it.
 #if defined(MODAR_ETC1_SEARCH_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef MODAR_ETC1_SEARCH_INL
@@ -72,7 +72,7 @@ constexpr std::int32_t top_of() {
   return kBits == 5 ? 31 : 15;
 }
 
-/// Quantised value near a sum of eight 8-bit values; x is brought into 0-2040 first.
+/// Quantised value near a sum of eight 8-bit values; x is clamped to 0-2040 first.
 template <int kBits>
 HWY_INLINE V quantise8(V x) {
   const V in = clamp(x, set(0), set(2040));

@@ -27,11 +27,11 @@
 namespace modar {
 namespace {
 
-/// What relief changes of a stored colour at most. More is nearer to what a shader would draw in
-/// the neutral room, and is more wrong where the light comes from elsewhere: not swept.
+/// Largest change of a stored colour. Higher matches the neutral room better and is more wrong in
+/// other light.
 constexpr float kMostRelief = 0.3F;
-/// Repeats of a picture over all triangles that are looked at: tiles beyond are left out evenly.
-/// More take time; fewer make the mean over the places that share a texel depend on the choice.
+/// Repeats of a picture over all triangles that are sampled; the rest is skipped evenly. More take
+/// time, fewer are less exact.
 constexpr double kMostRepeats = 8;
 /// Tiles that one triangle may span: what repeats more often shows no relief.
 constexpr double kMostTiles = 256;
@@ -253,8 +253,8 @@ FactorSums halved(const FactorSums& fine) {
   return coarse;
 }
 
-/// Means of all texels. Those without any, at the edges of what is shown, have that of the smallest
-/// square around them that has one: filters mix them in.
+/// Means of all texels. Those without any, at the edges of the visible part, have that of the
+/// smallest square around them that has one: filters mix them in.
 std::vector<float> means_of(const FactorSums& finest) {
   std::vector<FactorSums> levels = {finest};
   while (levels.back().width > 1 || levels.back().height > 1)
@@ -285,7 +285,7 @@ class ReliefRows {
         light_(light),
         sums_(sums) {}
 
-  /// every: of so many tiles one is looked at.
+  /// every: one tile of this many is looked at.
   void add(std::size_t triangle, std::uint32_t every, std::uint32_t first, std::uint32_t end) {
     const UvTriangle uv(mesh_, triangle);
     if (uv.area2 == 0) return;
@@ -308,7 +308,7 @@ class ReliefRows {
   }
 
  private:
-  /// The part of a triangle that lies on one repeat of the picture.
+  /// The part of a triangle on one repeat of the picture.
   void add_tile(std::size_t triangle, const UvTriangle& uv, glm::dvec2 tile, std::uint32_t first,
                 std::uint32_t end) {
     const glm::dvec2 size(sums_.width, sums_.height);
@@ -373,7 +373,7 @@ class ReliefRows {
   FactorSums& sums_;
 };
 
-/// White stands so many texels above black where an MTL file's bump map states no factor: a
+/// White is this many texels above black where an MTL file's bump map states no factor: a
 /// convention of this bake, as no format says in which unit heights are.
 constexpr float kHeightTexels = 4;
 
@@ -435,8 +435,8 @@ RgbaImage white_picture(const RgbaImage& map, std::uint32_t max_side) {
   return white;
 }
 
-/// The colours that relief is drawn on: white where there are none. As large as the normal map
-/// where that is larger; else as they are; no side above `max_side`.
+/// The colours that relief is drawn on: white if none. As large as the normal map
+/// where that is larger; else unchanged; no side above `max_side`.
 Result<RgbaImage> read_colours(const ReliefGroup& group, const RgbaImage& map,
                                const ReliefOptions& options) {
   if (group.colour.empty()) return white_picture(map, options.max_side);
@@ -458,8 +458,7 @@ class ReliefPainter {
   ReliefPainter(const TriMesh& mesh, const ReliefOptions& options)
       : mesh_(mesh), options_(options), light_(options.stands) {}
 
-  /// The picture, what colours are to be multiplied with beside it, and false where it is what it
-  /// was.
+  /// The picture, the factor for its colours, and false if it is unchanged.
   Result<bool> paint(const ReliefGroup& group, const Tangents& tangents, RgbaImage& image,
                      float& headroom) const {
     MODAR_ASSIGN(const RgbaImage map, read_normals(group.normal));

@@ -22,7 +22,7 @@ struct ReliefOptions {
 /// multiplied with if the surface looked where the map says, relative to what the device multiplies
 /// it with between vertices in the neutral room, upright; the mean where several places show one
 /// texel, and 30 % more or less at most. What gets brighter than white makes the material's diffuse
-/// greater. Made pictures lie in a temporary folder that the materials keep. The
+/// greater. New pictures are in a temporary folder that the materials keep. The
 /// device then needs nothing of the map. A map that cannot be read is a warning and left out.
 /// Errors: kIo where a picture cannot be written.
 Result<void> draw_relief(TriMesh& mesh, const ReliefOptions& options, Report& report);

@@ -18,7 +18,7 @@
 namespace modar {
 
 /// Raw bytes of a piece whose form needs no library: kStored, kTrackerRecord, kCoded. Verified.
-/// begun: of a kTrackerRecord, what was unpacked of these bytes while they came, or null.
+/// begun: of a kTrackerRecord, the part of these bytes that is unpacked already, or null.
 /// Errors: kInvalidInput "piece.*", "record.packed"; kUnsupported "piece.form".
 Result<std::vector<std::byte>> decode_own_piece(const PieceRecord& piece,
                                                 std::span<const std::byte> stored,
@@ -53,16 +53,16 @@ class ArrivingBundle {
   /// verified. Errors: as of BundleView::open().
   Result<void> keep(bool in_order);
   /// Whether every section that stays whole has the hash that the table states, and all bytes of
-  /// the others were looked at where keep() was told to. Errors: kInvalidInput
+  /// the others were looked at where keep() requires it. Errors: kInvalidInput
   /// "section.hash".
   [[nodiscard]] Result<void> verify() const;
   /// For what reads triangles of kept_ranges() alone: calls `read` while models have the chunks of
-  /// their coarsest stand-ins.
+  /// their coarsest proxies.
   template <class Read>
-  auto with_stand_ins(const Read& read) {
+  auto with_proxies(const Read& read) {
     const auto models = view_.section(SectionType::kModels);
     const std::vector<std::byte> before(models.begin(), models.end());
-    use_stand_ins(bytes(), view_);
+    use_proxies(bytes(), view_);
     auto answer = read();
     if (!models.empty()) put(static_cast<std::uint64_t>(models.data() - bytes_.get()), before);
     return answer;

@@ -7,12 +7,15 @@
  * everything that was created from it. Functions that take a modar_error fill it on failure; it may
  * be NULL. Functions that return int return MODAR_OK on success, else the error's status, unless
  * stated. A handle or pointer that is NULL and must not be is an error "capi.null" where there is a
- * modar_error, else an empty answer: 0, nothing drawn. Matrices are column-major, as in GL.
+ * modar_error, else an empty answer: 0, nothing drawn. So is a float or double that is not a number
+ * or exceeds 1e12 in amount ("capi.number"); an item with one is not drawn. Matrices are
+ * column-major, as in GL.
  *
  * Structures begin with `size`: set it to sizeof of the structure before each is first passed, as
  * in modar_pose pose = {.size = sizeof pose}; and fields that you do not use to 0. The library
- * reads and writes that many bytes and no more, so that later versions can append fields. All items
- * of an array have the size of its first one. */
+ * reads and writes that many bytes and no more, so that later versions can append fields: no
+ * structure has padding at its end, and `reserved` is 0. All items of an array have the size of its
+ * first one. */
 #ifndef MODAR_MODAR_H
 #define MODAR_MODAR_H
 
@@ -49,7 +52,7 @@ enum {
   MODAR_OK = 0,
   MODAR_USAGE = 1,       /* the call is wrong */
   MODAR_IO = 2,          /* a file cannot be read */
-  MODAR_INVALID = 3,     /* what was read is damaged or no such file */
+  MODAR_INVALID = 3,     /* the file is damaged or of another kind */
   MODAR_INTERNAL = 4,    /* internal error */
   MODAR_UNSUPPORTED = 5, /* this machine or this version cannot do that */
 };
@@ -62,6 +65,7 @@ typedef struct modar_error {
   char where[192];
   char cause[256];
   char cure[256];
+  int reserved;
 } modar_error;
 
 /* ---- bundles ---- */
@@ -84,6 +88,20 @@ void modar_bundle_close(modar_bundle* bundle);
  * phone the time to read the file from flash is added. */
 int modar_bundle_verify(const modar_bundle* bundle, modar_error* error);
 
+/* Returns 0, or MODAR_IO "io.changed" if the file of modar_bundle_open() was written to, or lost
+ * pages under modar_guard_files(): close the bundle. modar_tracker_step() fails with the same error
+ * at the next frame, as do modar_renderer_create() and modar_renderer_restore(); what draws does
+ * not check. Costs one stat(). Replacing the file by rename() changes nothing here. */
+MODAR_EXPERIMENTAL int modar_bundle_intact(const modar_bundle* bundle, modar_error* error);
+
+/* Without this, a process that reads a mapped bundle is ended by SIGBUS if another program has
+ * shortened the file or its disk was removed. This function installs a handler for SIGBUS in the
+ * whole process that replaces lost pages of bundles by zeros, and passes every other fault to the
+ * handler that it replaced (such as a JVM's or a crash reporter's). The library never does so by
+ * itself. Call it once, after other handlers are installed; bundles in an APK or in an app's own
+ * folder do not need it. */
+MODAR_EXPERIMENTAL void modar_guard_files(void);
+
 uint32_t modar_model_count(const modar_bundle* bundle);
 uint32_t modar_pattern_count(const modar_bundle* bundle);
 uint32_t modar_scene_count(const modar_bundle* bundle);
@@ -99,7 +117,7 @@ int modar_model_bounds(const modar_bundle* bundle, uint32_t index, float low[3],
 double modar_pattern_width_mm(const modar_bundle* bundle, uint32_t index);
 /* The gray picture of a pattern as the tracker compares it with frames: `*width` times `*height`
  * bytes in rows without padding, top row first, which stay in the bundle. Returns 1, or 0 and
- * changes nothing where there is none. */
+ * changes nothing if none exists. */
 int modar_pattern_picture(const modar_bundle* bundle, uint32_t index, int* width, int* height,
                           const uint8_t** gray);
 
@@ -109,191 +127,31 @@ MODAR_EXPERIMENTAL size_t modar_language(const modar_bundle* bundle, uint32_t in
                                          size_t size);
 enum {
   MODAR_TEXT = 0,     /* what to show of a pattern's scene */
-  MODAR_ALT_TEXT = 1, /* what is seen there, for screen readers */
+  MODAR_ALT_TEXT = 1, /* a description, for screen readers */
   MODAR_TITLE = 2,    /* of a node: its name for people */
-  MODAR_CAPTIONS = 3, /* of a video or sound: what is heard, as a WebVTT file */
+  MODAR_CAPTIONS = 3, /* of a video or sound: captions, as a WebVTT file */
 };
 /* A text of a pattern in a language; several are joined by a space. Copies and returns as the names
- * above, 0 where there is none. */
+ * above, 0 if none. */
 MODAR_EXPERIMENTAL size_t modar_pattern_text(const modar_bundle* bundle, uint32_t pattern, int kind,
                                              const char* language, char* text, size_t size);
 
-/* A model that stands on a pattern. place: model space to pattern space. */
+/* A model on a pattern. place: model space to pattern space. */
 typedef struct modar_scene {
   size_t size;
   uint32_t pattern;
   uint32_t model;
   float place[16];
   uint32_t number; /* its index + 1 */
+  int reserved;
 } modar_scene;
 /* Returns 1 and the scene, or 0 for an invalid index. */
 int modar_scene_at(const modar_bundle* bundle, uint32_t index, modar_scene* scene);
-/* The box of what stands on a pattern, in the pattern's space. Returns 0 and changes nothing where
+/* The box of a pattern's content, in the pattern's space. Returns 0 and changes nothing where
  * nothing does. */
 int modar_pattern_bounds(const modar_bundle* bundle, uint32_t pattern, float low[3], float high[3]);
 
 /* ---- the camera and its pose ---- */
-
-/* A pinhole camera with OpenCV's distortion, in pixels; the centre of the top-left pixel is (0, 0).
- */
-typedef struct modar_camera {
-  size_t size;
-  int width;
-  int height;
-  double fx, fy, cx, cy;
-  double distortion[5]; /* k1 k2 p1 p2 k3 */
-} modar_camera;
-/* The initial assumption for an unknown camera: its focal length is the frame's longer side. */
-void modar_camera_default(int width, int height, modar_camera* camera);
-/* Reads a file that `modar calibrate` wrote. */
-int modar_camera_read(const char* path, modar_camera* camera, modar_error* error);
-
-/* The pose of a pattern, as in the ModAR paper: 9 + 3 floats and a flag. It maps pattern space (x
- * right, y up, z towards the viewer, the longest side from -1 to 1) to camera space (x right, y
- * down, z forward): X_camera = rotation * X_pattern + translation. */
-typedef struct modar_pose {
-  size_t size;
-  float rotation[9];    /* row by row */
-  float translation[3]; /* unit: half of the pattern's longest side */
-  int visible;          /* 1: measured in this frame */
-  int shown;            /* 1: draw the model (while it is not visible, the pose is extrapolated) */
-  int inliers;          /* 0 if it is not visible */
-  float fit;            /* share of the examined features that agree with the pose, 0 to 1 */
-  float corners[8];     /* x, y in pixels: top left, top right, bottom right, bottom left */
-  float agreeing; /* share of the pattern's textured cells in view that match the picture, 0 to 1 */
-  float likeness; /* mean correlation of these cells, 0 to 1 */
-  int extended;   /* 1: it is covered or out of the frame, and the pose is derived from its
-                     surroundings, with these */
-  float position_sigma; /* standard deviations: position, in half of the pattern's longest side, */
-  float rotation_sigma; /* and rotation, in radians */
-  float stretch[12];    /* 3 x 4, row by row; all 0: none. While the camera is estimated, no pose
-                           explains    exactly where a flat pattern's picture lies. Draw what belongs
-                           on    it at    X_camera = rotation * (stretch * (X_pattern, 1)) +
-                           translation,    as    modar_view()    does */
-} modar_pose;
-
-/* Returns NULL and an error if no pattern of the bundle can be tracked. */
-modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_camera* camera,
-                                    modar_error* error);
-/* How to track. */
-typedef struct modar_tracker_options {
-  size_t size;
-  int async_search; /* 1: search on a separate thread; results then depend on timing */
-  int search_every; /* frames between searches for more patterns while one is tracked; 0: default
-                       (10) */
-  double smooth_ms; /* steadies poses at rest, which may lag by this much; 0: off */
-  int budget; /* without async_search: limit of ARMv7 instructions per frame, in millions, at least
-               * 12: a search is spread over several frames, with the same results on every phone;
-               * 0: no limit */
-  int extended; /* 1: learn the static surroundings of the largest pattern, and continue from them
-                 * while the pattern is covered or out of the frame; requires camera motion
-                 * beforehand */
-  int estimate_camera; /* 1: the camera is a guess (modar_camera_default()): estimate its focal
-                        * length and the aspects of flat patterns from the frames; see
-                        * modar_tracker_camera() */
-} modar_tracker_options;
-modar_tracker* modar_tracker_create_with(const modar_bundle* bundle, const modar_camera* camera,
-                                         const modar_tracker_options* options, modar_error* error);
-void modar_tracker_destroy(modar_tracker* tracker);
-/* Forgets tracked patterns, for example after a pause or a cut. */
-void modar_tracker_reset(modar_tracker* tracker);
-/* Processes a frame of the camera's size, 8-bit gray: the luma plane of NV21, or what modar_gray()
- * makes of other formats. stride: bytes from row to row, at least the camera's width. A frame
- * without a pattern is not an error. */
-int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t stride,
-                       modar_error* error);
-/* The same with the frame's time, which must increase and is used for smoothing;
- * modar_tracker_step() assumes 30 frames per second. */
-int modar_tracker_step_at(modar_tracker* tracker, const uint8_t* gray, size_t stride, double time_s,
-                          modar_error* error);
-/* Shrinks a gray picture: divides its sides by `factor`, each pixel the mean of a square. Large
- * frames are tracked equally well with a long side of 640 to 1280 pixels, in a fraction of the
- * time. out has (width / factor) * (height / factor) bytes, and may be `gray`. */
-void modar_shrink(const uint8_t* gray, size_t stride, int width, int height, int factor,
-                  uint8_t* out);
-/* The camera's rotation from the last frame to the next one, from a gyroscope: a rotation vector in
- * radians, in the camera's axes (x right, y down, z forward; those of a phone's sensors differ).
- * Helps `extended`. */
-MODAR_EXPERIMENTAL void modar_tracker_turn(modar_tracker* tracker, const double rotation[3]);
-/* The pose of a pattern in the newest frame; returns its flag `visible`. */
-int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pose* pose);
-/* The camera with which the newest frame's poses were measured; draw with it. Returns the standard
- * deviation of its focal length in pixels if that is estimated, else 0. */
-double modar_tracker_camera(const modar_tracker* tracker, modar_camera* camera);
-/* Why nothing is visible: "few matches", "lost by blur", ...; "visible" if something is. */
-const char* modar_tracker_reason(const modar_tracker* tracker);
-
-/* ---- pictures of one's own ---- */
-
-/* Looks for one flat thing on a plain table in a photo: 8-bit R, G, B and a byte that is not looked
- * at, in rows without padding, top row first. Returns 1 and its corners clockwise from the top left
- * as x, y in pixels (the top left pixel's corner is 0, 0), within some pixels: let people mend
- * them; or 0. */
-MODAR_EXPERIMENTAL int modar_photo_corners(const uint8_t* rgba, int width, int height,
-                                           float corners[8]);
-enum { MODAR_FLAT_SIDE = 512 };
-/* The gray picture between four such corners, as from the front, for modar_record_create(): rows
- * without padding in `gray`, which takes MODAR_FLAT_SIDE * MODAR_FLAT_SIDE bytes. Returns 1, or 0
- * and changes nothing where the corners are no convex quadrangle. */
-MODAR_EXPERIMENTAL int modar_photo_flat(const uint8_t* rgba, int width, int height,
-                                        const float corners[8], uint8_t* gray, int* flat_width,
-                                        int* flat_height);
-/* Makes a pattern of a flat picture that its user has taken, as `modar bake` does, to the same
- * bytes: 8-bit gray, top row first, 32 to 1023 pixels a side (modar_shrink() makes it smaller; a
- * longer side of 500 will do). It runs on any thread, and takes 0.4 s of an x86-64 server's time
- * for 300,000 pixels. Returns NULL and an error: "pattern.loop-size", or "pattern.plain" and
- * "pattern.no-features" for a picture with too little in it to be recognised. */
-MODAR_EXPERIMENTAL modar_record* modar_record_create(const uint8_t* gray, size_t stride, int width,
-                                                     int height, modar_error* error);
-/* Its bytes, to be kept for the next start. They belong to the record. */
-MODAR_EXPERIMENTAL const void* modar_record_bytes(const modar_record* record, size_t* size);
-/* Copies and checks such bytes. */
-MODAR_EXPERIMENTAL modar_record* modar_record_open(const void* bytes, size_t size,
-                                                   modar_error* error);
-MODAR_EXPERIMENTAL void modar_record_close(modar_record* record);
-/* Tracks the picture as well; the record is copied. `*pattern` becomes its number for
- * modar_tracker_pose(), after those of the bundle. All patterns are searched anew. Its models are
- * the caller's choice: a modar_scene with any model and place. */
-MODAR_EXPERIMENTAL int modar_tracker_add_pattern(modar_tracker* tracker, const modar_record* record,
-                                                 uint32_t* pattern, modar_error* error);
-
-/* GL's projection matrix for the camera: maps pixels of the frame to pixels of a viewport that
- * shows it. */
-void modar_projection(const modar_camera* camera, double near_plane, double far_plane,
-                      float projection[16]);
-/* A look without a camera: the pose of a pattern for a camera that goes around what stands on it
- * and shows all of that (where nothing does, the pattern). turn: radians about the pattern's
- * normal; tilt: radians above its plane; zoom: 1 to show all, 2 for twice as large. Sets the focal
- * length and centre of `camera`, which has the size of the picture, and the pose to `shown`.
- * Returns 0 and changes nothing for an invalid index or size.
- */
-MODAR_EXPERIMENTAL int modar_orbit(const modar_bundle* bundle, uint32_t pattern, double turn,
-                                   double tilt, double zoom, modar_camera* camera,
-                                   modar_pose* pose);
-/* Pattern space to GL's eye space (x right, y up, z backward). */
-void modar_view(const modar_pose* pose, float view[16]);
-
-/* ---- drawing ---- */
-
-/* Creates an off-screen OpenGL ES 2.0 context and makes it current; programs with a surface use
- * their own. */
-modar_context* modar_context_create(modar_error* error);
-void modar_context_destroy(modar_context* context);
-
-/* A model to draw. to_eye: model space to GL's eye space. */
-typedef struct modar_item {
-  size_t size;
-  uint32_t model;
-  float to_eye[16];
-  uint32_t scene;         /* number of the scene whose light to use; 0: a neutral room's */
-  float world_to_eye[16]; /* pattern space, to which the light is fixed, to GL's eye space; zeros: a
-                             level camera's world */
-  float opacity; /* 0 or 1: as baked; between: what is behind shows through, as through glass */
-  uint32_t node; /* number of its node: its index + 1; 0: none. A picture is drawn in place of a
-                    model, and to_eye takes the square from -1 to 1 of its plane z = 0 */
-} modar_item;
-/* to_eye = view * place, world_to_eye = view; the rest stays. */
-void modar_item_place(modar_item* item, const modar_scene* scene, const modar_pose* pose);
 
 enum {
   MODAR_RGB = 0,
@@ -321,6 +179,201 @@ typedef struct modar_picture {
  * the picture's own first plane if its rows have no padding. */
 int modar_gray(const modar_picture* picture, uint8_t* gray, modar_error* error);
 
+/* A pinhole camera with OpenCV's distortion, in pixels; the centre of the top-left pixel is (0, 0).
+ */
+typedef struct modar_camera {
+  size_t size;
+  int width;
+  int height;
+  double fx, fy, cx, cy;
+  double distortion[5]; /* k1 k2 p1 p2 k3 */
+} modar_camera;
+/* The initial assumption for an unknown camera: its focal length is the frame's longer side. */
+void modar_camera_default(int width, int height, modar_camera* camera);
+/* Reads a file that `modar calibrate` wrote. */
+int modar_camera_read(const char* path, modar_camera* camera, modar_error* error);
+
+/* The pose of a pattern, as in the ModAR paper: 9 + 3 floats and a flag. It maps pattern space (x
+ * right, y up, z towards the viewer, the longest side from -1 to 1) to camera space (x right, y
+ * down, z forward): X_camera = rotation * X_pattern + translation. */
+typedef struct modar_pose {
+  size_t size;
+  float rotation[9];    /* row by row */
+  float translation[3]; /* unit: half of the pattern's longest side */
+  int visible;          /* 1: measured in this frame */
+  int shown;            /* 1: draw the model (while it is not visible, the pose is extrapolated) */
+  int inliers;          /* 0 if it is not visible */
+  float fit;            /* share of the examined features that agree with the pose, 0 to 1 */
+  float corners[8];     /* x, y in pixels: top left, top right, bottom right, bottom left */
+  /* Share of the pattern's textured cells in view that match the picture, 0 to 1; and the mean
+   * correlation of these cells, 0 to 1. */
+  float agreeing;
+  float likeness;
+  /* 1: the pattern is covered or out of the frame, and the pose is derived from its surroundings,
+   * with these standard deviations: position in half of the pattern's longest side, rotation in
+   * radians. */
+  int extended;
+  float position_sigma;
+  float rotation_sigma;
+  /* 3 x 4, row by row; all 0: none. While the camera is estimated, no pose explains exactly where a
+   * flat pattern's picture is. Draw what belongs on it at
+   *   X_camera = rotation * (stretch * (X_pattern, 1)) + translation,
+   * as modar_view() does. */
+  float stretch[12];
+  int reserved;
+} modar_pose;
+
+/* How to track. */
+typedef struct modar_tracker_options {
+  size_t size;
+  int async_search; /* 1: search on a separate thread; results then depend on timing */
+  int search_every; /* frames between searches for more patterns while one is tracked; 0: default
+                       (10) */
+  double smooth_ms; /* steadies poses at rest, which may lag by this much; 0: off */
+  /* Without async_search: limit of ARMv7 instructions per frame, in millions, at least 12: a search
+   * is spread over several frames, with the same results on every phone. 0: no limit. */
+  int budget;
+  /* 1: learn the static surroundings of the largest pattern, and continue from them while the
+   * pattern is covered or out of the frame; requires camera motion beforehand. */
+  int extended;
+  /* 1: the camera is a guess (modar_camera_default()): estimate its focal length and the aspects of
+   * flat patterns from the frames; see modar_tracker_camera(). */
+  int estimate_camera;
+  int reserved;
+} modar_tracker_options;
+/* options: NULL: all 0. Returns NULL and an error if no pattern of the bundle can be tracked. */
+modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_camera* camera,
+                                    const modar_tracker_options* options, modar_error* error);
+void modar_tracker_destroy(modar_tracker* tracker);
+/* Forgets tracked patterns, for example after a pause or a cut. */
+void modar_tracker_reset(modar_tracker* tracker);
+/* Processes a frame of the camera's size, 8-bit gray: the luma plane of NV21, or what modar_gray()
+ * makes of other formats. stride: bytes from row to row, at least the camera's width. time_s: the
+ * frame's time, which must increase and is used for smoothing; below 0: a 30th of a second after
+ * the previous frame's. A frame without a pattern is not an error. */
+int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t stride, double time_s,
+                       modar_error* error);
+/* Shrinks a gray picture: divides its sides by `factor`, each pixel the mean of a square. Large
+ * frames are tracked equally well with a long side of 640 to 1280 pixels, in a fraction of the
+ * time. out has (width / factor) * (height / factor) bytes, and may be `gray`. */
+void modar_shrink(const uint8_t* gray, size_t stride, int width, int height, int factor,
+                  uint8_t* out);
+/* The camera's rotation from the last frame to the next one, from a gyroscope: a rotation vector in
+ * radians, in the camera's axes (x right, y down, z forward; those of a phone's sensors differ).
+ * Helps `extended`. */
+MODAR_EXPERIMENTAL void modar_tracker_turn(modar_tracker* tracker, const double rotation[3]);
+/* The pose of a pattern in the newest frame; returns its flag `visible`. */
+int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pose* pose);
+/* The camera with which the newest frame's poses were measured; draw with it. Returns the standard
+ * deviation of its focal length in pixels if that is estimated, else 0. */
+double modar_tracker_camera(const modar_tracker* tracker, modar_camera* camera);
+/* Why no pattern is visible in a frame. Later versions may add numbers. */
+enum {
+  MODAR_REASON_VISIBLE = 0,             /* one is */
+  MODAR_REASON_NO_FEATURES = 1,         /* the frame has no corners to describe */
+  MODAR_REASON_FEW_MATCHES = 2,         /* too few features match a pattern's */
+  MODAR_REASON_NOT_IN_VIEW = 3,         /* some match, as in any picture, but no pose agrees */
+  MODAR_REASON_FAILED_VERIFICATION = 4, /* the pose is impossible, or the frame does not match it */
+  MODAR_REASON_LOST_BY_BLUR = 5,        /* it was tracked and should be in view, but cannot match */
+  MODAR_REASON_OUT_OF_VIEW = 6,         /* it was tracked and left the frame */
+  MODAR_REASON_ANOTHER_PRINT = 7,       /* another print of its series, or its mirror image */
+  MODAR_REASON_CURVED = 8,              /* its paper is too curved for a planar pose */
+};
+/* Of the newest frame; of several patterns, that of the one that came closest to being visible. -1
+ * without a tracker. */
+int modar_tracker_reason(const modar_tracker* tracker);
+/* Its name, "lost by blur": the constant in lower case, with spaces. "unknown" for other numbers.
+ */
+const char* modar_reason_text(int reason);
+
+/* ---- the user's own pictures ---- */
+
+/* Looks for one flat thing on a plain table in a photo, a picture with the format MODAR_RGBA.
+ * Returns 1 and its corners clockwise from the top left as x, y in pixels (the top left pixel's
+ * corner is 0, 0), within some pixels: let people correct them; or 0. */
+MODAR_EXPERIMENTAL int modar_photo_corners(const modar_picture* photo, float corners[8]);
+enum { MODAR_FLAT_SIDE = 512 };
+/* The gray picture between four such corners, as from the front, for modar_record_create(): rows
+ * without padding in `gray`, which takes MODAR_FLAT_SIDE * MODAR_FLAT_SIDE bytes. Returns 1, or 0
+ * and changes nothing if the corners are not a convex quadrilateral. */
+MODAR_EXPERIMENTAL int modar_photo_flat(const modar_picture* photo, const float corners[8],
+                                        uint8_t* gray, int* flat_width, int* flat_height);
+/* Makes a pattern of a flat picture that its user has taken, as `modar bake` does, to the same
+ * bytes: 8-bit gray, top row first, 32 to 1023 pixels a side (modar_shrink() makes it smaller; a
+ * longer side of 500 will do). It runs on any thread, and takes 0.4 s of an x86-64 server's time
+ * for 300,000 pixels. Returns NULL and an error: "pattern.loop-size", or "pattern.plain" and
+ * "pattern.no-features" for a picture with too little in it to be recognised. */
+MODAR_EXPERIMENTAL modar_record* modar_record_create(const uint8_t* gray, size_t stride, int width,
+                                                     int height, modar_error* error);
+/* Its bytes, to be kept for the next start. They belong to the record. They are a bundle's tracker
+ * record and keep as long: every later library of bundle format 1 opens them, on every processor.
+ * A library that does not know their feature extractor (a newer one's) refuses them: keep the
+ * picture as well, and make the record again. Of everything else here nothing may be stored:
+ * structures, handles and numbers of patterns, scenes and nodes are those of a run. */
+MODAR_EXPERIMENTAL const void* modar_record_bytes(const modar_record* record, size_t* size);
+/* Copies and checks such bytes. Returns NULL and an error "tracker.record" if they are damaged or
+ * of another feature extractor. */
+MODAR_EXPERIMENTAL modar_record* modar_record_open(const void* bytes, size_t size,
+                                                   modar_error* error);
+MODAR_EXPERIMENTAL void modar_record_close(modar_record* record);
+/* Tracks the picture as well; the record is copied. `*pattern` becomes its number for
+ * modar_tracker_pose(), after those of the bundle. All patterns are searched anew. Its models are
+ * the caller's choice: a modar_scene with any model and place. */
+MODAR_EXPERIMENTAL int modar_tracker_add_pattern(modar_tracker* tracker, const modar_record* record,
+                                                 uint32_t* pattern, modar_error* error);
+
+/* GL's projection matrix for the camera: maps pixels of the frame to pixels of a viewport that
+ * shows it. */
+void modar_projection(const modar_camera* camera, double near_plane, double far_plane,
+                      float projection[16]);
+/* From where modar_orbit() looks. */
+typedef struct modar_turntable {
+  size_t size;
+  double turn; /* radians about the pattern's normal */
+  double tilt; /* radians above its plane */
+  double zoom; /* 1: all fits; 2: twice as large */
+} modar_turntable;
+/* A view without a camera: the pose of a pattern for a camera that goes around its content and
+ * shows all of it (without content: the pattern). Sets the focal length and centre of `camera`,
+ * which has the size of the picture, and `pose`. Returns 0 and changes nothing for an invalid
+ * index or size. */
+MODAR_EXPERIMENTAL int modar_orbit(const modar_bundle* bundle, uint32_t pattern,
+                                   const modar_turntable* from, modar_camera* camera,
+                                   modar_pose* pose);
+/* Pattern space to GL's eye space (x right, y up, z backward). */
+void modar_view(const modar_pose* pose, float view[16]);
+
+/* ---- drawing ---- */
+
+/* Creates an off-screen OpenGL ES 2.0 context and makes it current; programs with a surface use
+ * their own. */
+modar_context* modar_context_create(modar_error* error);
+void modar_context_destroy(modar_context* context);
+
+/* A model to draw. to_eye: model space to GL's eye space. */
+typedef struct modar_item {
+  size_t size;
+  uint32_t model;
+  float to_eye[16];
+  uint32_t scene;         /* number of the scene whose light to use; 0: a neutral room's */
+  float world_to_eye[16]; /* pattern space, to which the light is fixed, to GL's eye space; zeros: a
+                             level camera's world */
+  float opacity; /* 0 or 1: as baked; between: the background shows through, as through glass */
+  uint32_t node; /* number of its node: its index + 1; 0: none. A picture is drawn in place of a
+                    model, and to_eye takes the square from -1 to 1 of its plane z = 0 */
+} modar_item;
+/* to_eye = view * place, world_to_eye = view; the rest stays. */
+void modar_item_place(modar_item* item, const modar_scene* scene, const modar_pose* pose);
+/* The items of a frame, and how they are seen. */
+typedef struct modar_drawing {
+  size_t size;
+  const modar_camera* camera; /* the frame's */
+  const float* projection;    /* 16 floats; NULL: that of `camera`, with depth limits that enclose
+                                 the items */
+  const modar_item* items;
+  size_t item_count;
+} modar_drawing;
+
 typedef struct modar_render_stats {
   size_t size;
   int draw_calls;
@@ -336,8 +389,9 @@ typedef struct modar_render_stats {
 modar_renderer* modar_renderer_create(const modar_bundle* bundle, const char* device,
                                       uint64_t gpu_bytes, modar_error* error);
 /* Of a bundle whose bytes are still coming, as Renderer::create_part() of modar/renderer.hpp.
- * part: 0: only the coarsest is there; 1: modar_renderer_put() brings what GPUs draw from; 2: it
- * brings what views need (modar_renderer_open_wanted()), within gpu_bytes of GL memory. */
+ * part: 0: only the coarsest is there; 1: modar_renderer_put() uploads the data that GPUs draw
+ * from; 2: it uploads the data that views need (modar_renderer_open_wanted()), within gpu_bytes of
+ * GL memory. */
 MODAR_EXPERIMENTAL modar_renderer* modar_renderer_create_part(const modar_bundle* bundle, int part,
                                                               uint64_t gpu_bytes,
                                                               modar_error* error);
@@ -369,13 +423,12 @@ typedef struct modar_render_options {
   int fixed_light;  /* 1: light does not adapt to the camera's pictures of the patterns */
   int samples; /* samples per pixel of modar_renderer_render(), from the next resize on (4: smooth
                 * edges); the app's own surface has those that it was created with */
+  int reserved;
 } modar_render_options;
 void modar_render_options_default(modar_render_options* options);
 void modar_renderer_set_options(modar_renderer* renderer, const modar_render_options* options);
 /* Current GL memory of the bundle, in bytes. */
 uint64_t modar_renderer_gpu_bytes(const modar_renderer* renderer);
-/* direction, exclusive: as in modar_render_options. */
-void modar_renderer_set_light(modar_renderer* renderer, const float direction[3], int exclusive);
 /* The viewport of a camera frame and its models in the bound framebuffer, in pixels, (0, 0) at the
  * bottom left. The frame is turned clockwise by `rotation`. */
 typedef struct modar_surface {
@@ -390,17 +443,15 @@ typedef struct modar_surface {
 /* Draws into the bound framebuffer, which needs a depth buffer; modar_renderer_resize() is not
  * needed. picture NULL: draws the items only, over the app's own camera picture, for a frame of the
  * camera's size. The resulting alpha is coverage, with premultiplied colours if the surface was
- * transparent. projection: as for modar_renderer_render(). */
+ * transparent. */
 void modar_renderer_draw(modar_renderer* renderer, const modar_surface* surface,
-                         const modar_picture* picture, const modar_camera* camera,
-                         const float projection[16], const modar_item* items, size_t count);
+                         const modar_picture* picture, const modar_drawing* drawing);
 /* Estimates the light from a frame that the app draws itself (picture NULL above), for later draws.
- * Every fourth frame and a smaller copy of the whole frame are enough. camera: the frame's; items:
- * as drawn on it. Makes no GL calls. */
+ * Every fourth frame and a smaller copy of the whole frame are enough. drawing: as drawn on the
+ * frame; its projection is not used. Makes no GL calls. */
 MODAR_EXPERIMENTAL void modar_renderer_observe(modar_renderer* renderer,
                                                const modar_picture* picture,
-                                               const modar_camera* camera, const modar_item* items,
-                                               size_t count);
+                                               const modar_drawing* drawing);
 /* Converts a touch (pixels from the viewport's top left, y down) to a pixel of the frame. */
 void modar_surface_to_frame(const modar_surface* surface, const modar_camera* camera, double x,
                             double y, double* frame_x, double* frame_y);
@@ -412,16 +463,16 @@ typedef struct modar_hit {
   float point[3];    /* in the item's model space */
   float distance;    /* from the eye, in eye space */
   uint32_t material; /* number of the material there, for modar_event; 0: it is a picture */
+  int reserved;
 } modar_hit;
 /* Returns 1 and the hit, or 0. Reads the triangles from the bundle's bytes: meant for taps, not for
- * every frame. Pictures are hit where they are seen through, too. */
-MODAR_EXPERIMENTAL int modar_pick(const modar_bundle* bundle, const modar_camera* camera,
-                                  double frame_x, double frame_y, const modar_item* items,
-                                  size_t count, modar_hit* hit);
+ * every frame. Transparent parts of pictures are hit, too. The drawing's projection is not used. */
+MODAR_EXPERIMENTAL int modar_pick(const modar_bundle* bundle, const modar_drawing* drawing,
+                                  double frame_x, double frame_y, modar_hit* hit);
 
 /* ---- nodes and actions: scenes that act ---- */
 
-/* A bundle may name what stands on its patterns, hide it at first, and say what happens when a
+/* A bundle may name the content of its patterns, hide it at first, and say what happens when a
  * pattern is found or something is tapped. An app that draws the scenes itself shows them all, and
  * nothing happens. */
 enum {
@@ -440,6 +491,7 @@ typedef struct modar_node {
   int hidden;     /* 1: until an action shows it */
   uint32_t media; /* of a video or sound: number of its file, its index + 1; else 0 */
   int loops;      /* 1: it begins again where it ends */
+  int reserved;
 } modar_node;
 MODAR_EXPERIMENTAL uint32_t modar_node_count(const modar_bundle* bundle);
 /* Returns 1 and the node, or 0 for an invalid index. */
@@ -449,12 +501,11 @@ MODAR_EXPERIMENTAL size_t modar_node_name(const modar_bundle* bundle, uint32_t i
                                           size_t size);
 MODAR_EXPERIMENTAL size_t modar_node_mark(const modar_bundle* bundle, uint32_t index, char* text,
                                           size_t size);
-/* kind: MODAR_TITLE, MODAR_TEXT, MODAR_ALT_TEXT or MODAR_CAPTIONS; 0 where there is none in the
- * language. */
+/* kind: MODAR_TITLE, MODAR_TEXT, MODAR_ALT_TEXT or MODAR_CAPTIONS; 0 if none in the language. */
 MODAR_EXPERIMENTAL size_t modar_node_text(const modar_bundle* bundle, uint32_t index, int kind,
                                           const char* language, char* text, size_t size);
 
-/* What is heard of a node in a language as plain lines: at a time of its video or sound, seconds
+/* The captions of a node in a language as plain lines: at a time of its video or sound, seconds
  * (empty: nothing), or with a time below 0 all of it. Copies and returns as modar_pattern_name().
  */
 MODAR_EXPERIMENTAL size_t modar_node_caption(const modar_bundle* bundle, uint32_t index,
@@ -467,8 +518,8 @@ typedef struct modar_media {
   size_t size;
   int width; /* pixels; of a sound 0 */
   int height;
+  int sound; /* 1: it has a sound track */
   double seconds;
-  int sound;            /* 1: it has a sound track */
   const uint8_t* bytes; /* in the bundle */
   size_t byte_count;
 } modar_media;
@@ -498,6 +549,7 @@ typedef struct modar_event {
   int kind;
   uint32_t subject;  /* index of the pattern or node */
   uint32_t material; /* of a tap on a model: as in modar_hit; else 0 */
+  int reserved;
 } modar_event;
 enum {
   MODAR_PLAY = 1,  /* play the video or sound `node`, from where it was, or from its beginning after
@@ -511,6 +563,7 @@ typedef struct modar_command {
   int kind;
   uint32_t node;
   uint32_t action; /* index, or 0xFFFFFFFF: a label that was tapped */
+  int reserved;
 } modar_command;
 /* One step, at least once a frame. time_s: seconds, which do not fall. The pattern counts as lost
  * when it was not seen for more than a second. Returns how many commands there are for the app.
@@ -527,8 +580,8 @@ MODAR_EXPERIMENTAL int modar_actions_shown(const modar_actions* actions, uint32_
 /* 1: step and draw on, even if no frame comes: something turns, or a delay runs. */
 MODAR_EXPERIMENTAL int modar_actions_waiting(const modar_actions* actions);
 
-/* What of a pattern is to be drawn: the models of its scenes and its pictures, without what is
- * hidden, turned as actions say. view: modar_view() of its pose. items: `capacity` of them, the
+/* What of a pattern is to be drawn: the models of its scenes and its pictures, without hidden
+ * ones, turned as actions say. view: modar_view() of its pose. items: `capacity` of them, the
  * first with its size set; as many as the bundle has scenes and nodes are enough. Returns how many
  * it filled. */
 MODAR_EXPERIMENTAL size_t modar_actions_items(modar_actions* actions, uint32_t pattern,
@@ -540,20 +593,19 @@ typedef struct modar_label {
   size_t size;
   float x, y;     /* pixel of the frame */
   float distance; /* from the eye, in eye space */
-  int covered;    /* 1: an item lies before its point */
+  int covered;    /* 1: an item is in front of its point */
 } modar_label;
-/* Returns 1 and the label, or 0 if it is hidden, behind the camera, or no label. items: what was
- * drawn; NULL: not looked at, which saves the time of modar_pick(). */
+/* Returns 1 and the label, or 0 if it is hidden, behind the camera, or no label. view: modar_view()
+ * of its pattern's pose. drawing: the last drawing; without items, nothing covers the label, which
+ * saves the time of modar_pick(). */
 MODAR_EXPERIMENTAL int modar_label_project(const modar_actions* actions, uint32_t node,
-                                           const modar_camera* camera, const float view[16],
-                                           const modar_item* items, size_t count,
+                                           const modar_drawing* drawing, const float view[16],
                                            modar_label* label);
 
 /* Draws the picture (NULL: the clear colour) and the items over it off-screen, in the picture's (or
- * camera's) aspect. projection NULL: that of `camera`, with depth limits that enclose the items. */
+ * camera's) aspect. drawing NULL: the picture alone. */
 void modar_renderer_render(modar_renderer* renderer, const modar_picture* picture,
-                           const modar_camera* camera, const float projection[16],
-                           const modar_item* items, size_t count);
+                           const modar_drawing* drawing);
 /* Copies the rendered picture to the bound framebuffer, as large as it fits. */
 void modar_renderer_show(modar_renderer* renderer, int window_width, int window_height);
 /* Reads the rendered picture, top row first: width * height * 4 bytes, none before a size is known.

@@ -13,10 +13,8 @@
 namespace modar {
 
 struct TrackerRecordOptions {
-  /// Descriptors kept, at most. More of them are right in harder views and cost matching time and
-  /// 44 bytes each. The study in which this loop was designed: 1,000 features a frame on 3,000
-  /// codes 89 % right at area 0.1-0.25 in 9 ms, 1,500 on 4,000 codes 94 % in 12 ms.
-  std::uint32_t features = 3000;
+  /// Descriptors kept, at most. More find harder views, and cost matching time and 44 bytes each.
+  std::uint32_t features = 2880;
   /// Random renderings that decide which descriptors are kept. More make a better choice and a
   /// slower bake: of prints on 2 to 5 % of the frame, 53.3, 56.7 and 57.5 % of the poses are right
   /// with 60, 120 and 240.

@@ -62,7 +62,7 @@ AffineView make_view(int picture_width, int picture_height, double scale, double
 /// The picture and its successive halvings, down to a side of 8.
 std::vector<GrayPicture> halved(const GrayImage& picture);
 
-/// One of the halvings, with each pixel's neighbours packed beside it as rendering reads them.
+/// One of the halvings, with each pixel's neighbours packed next to it as rendering reads them.
 struct ViewLevel : GrayPicture {
   std::vector<std::uint32_t> quads;  ///< see ViewSamples
 };

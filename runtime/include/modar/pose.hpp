@@ -34,7 +34,7 @@ Result<glm::dmat3> homography_from_points(std::span<const glm::dvec2, 4> from,
                                           std::span<const glm::dvec2, 4> to);
 
 /// Homography to camera pose (ModAR Eq. 3-5). homography: pattern plane -> undistorted pixels.
-/// Deviation: its sign is chosen such that the pattern lies before the camera, and the last
+/// Deviation: its sign is chosen such that the pattern is in front of the camera, and the last
 /// singular vector is flipped if det(U V^T) < 0. Errors: kInvalidInput "pose.degenerate".
 Result<Pose> pose_from_homography(const Camera& camera, const glm::dmat3& homography);
 

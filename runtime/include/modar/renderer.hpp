@@ -37,7 +37,7 @@ struct DrawItem {
   /// The space to which the light is fixed (a pattern's: x right, y up, z towards the viewer and
   /// the ceiling) to eye space; see gl_view(). Default: the world of a camera that is held level.
   glm::mat4 world_to_eye{1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};
-  float opacity = 1.0f;  ///< factor on that of its materials; below 1, what is behind shows through
+  float opacity = 1.0f;  ///< factor on that of its materials; below 1, the background shows through
   std::uint32_t node = kNone;  ///< whose item it is. Of a picture: it is drawn in place of a model,
                                ///< to_eye takes the square [-1,1] of z = 0 to eye space
 };
@@ -59,8 +59,8 @@ struct RoomLight {
 inline constexpr float kMostShininess = 40.0f;
 
 /// What a surface mirrors of RoomLight::sky along the mirrored ray: factors on its linear and its
-/// quadratic part, as the surface blurs them; the share straight on, and what is added to it times
-/// (1 - cosine)^5 of the angle of sight. Metal mirrors by its colour beside this.
+/// quadratic part, as the surface blurs them; the share straight on, and the increase times (1 -
+/// cosine)^5 of the angle of sight. Metal mirrors by its colour in addition.
 glm::vec4 mirror_factors(float shininess, float reflectance, float metalness);
 
 /// A neutral room, lit from above: the default light.
@@ -189,7 +189,7 @@ struct Pick {
   std::size_t item = 0;            ///< index into the items
   glm::vec3 point{0.0f};           ///< in the item's model space
   float distance = 0.0f;           ///< from the eye, in eye space
-  std::uint32_t material = kNone;  ///< that lies there; kNone: a picture's
+  std::uint32_t material = kNone;  ///< that is there; kNone: a picture's
 };
 
 /// Casts a ray through a pixel of the frame (an ideal pinhole's, as models are drawn) against the
@@ -208,16 +208,16 @@ class Renderer {
   /// least recently visible. The bundle's bytes must outlive the renderer. Errors:
   /// kUnsupported "gl.*".
   static Result<std::unique_ptr<Renderer>> create(const BundleView& bundle, const GlCaps& caps);
-  /// What is there of a bundle of which not all bytes are.
+  /// The present parts of an incomplete bundle.
   enum class Part : std::uint8_t {
     /// The coarsest of everything, and the bundle's tables say so (show_coarsest() of
-    /// formats/transport/stages.hpp): what is drawn is uploaded then.
+    /// formats/transport/stages.hpp): drawn levels are uploaded then.
     kCoarsest,
-    /// put() brings vertices, indices and texture blocks, which are not read from the bundle's
+    /// put() uploads vertices, indices and texture blocks, which are not read from the bundle's
     /// bytes, except what kept_ranges() names there. To be drawn with when all of them have come.
     kComes,
     /// What kept_ranges() names, and more comes when a view needs it: for bundles that exceed the
-    /// memory. Each picture shows the finest that is there, of a model one stand-in or all chunks
+    /// memory. Each picture shows the finest that is there, of a model one proxy or all chunks
     /// that are seen, and decides what open_wanted() asks for: the coarsest of what it lacks, the
     /// nearest first. What no picture shows any more makes room, the longest unseen first.
     /// caps.gpu_memory: bytes, not 0; a view wants two thirds of it, so that what it shows
@@ -274,13 +274,13 @@ class Renderer {
   void put(std::uint64_t offset, std::span<const std::byte> bytes);
 
   /// Of Part::kWanted: bytes of the bundle that the last view lacks.
-  struct Wanted {
+  struct StreamRequest {
     std::uint32_t number = kNone;  ///< for have(); kNone: it lacks nothing that there is room for
     std::uint64_t offset = 0;      ///< in the bundle
     std::uint64_t size = 0;
   };
   /// The next one, from now on open: put() takes its bytes, each once.
-  Wanted open_wanted();
+  StreamRequest open_wanted();
   /// All bytes of an open one were put().
   void have(std::uint32_t number);
 

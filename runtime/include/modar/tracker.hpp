@@ -38,8 +38,8 @@ struct Detection {
       corners{};  ///< frame pixels: top-left, top-right, bottom-right, bottom-left; including
                   ///< hidden ones of a curved pattern; of a box those of its first face
   Pose pose;
-  /// Of a flat pattern, while the camera is a guess: what no pose explains of where its picture
-  /// lies, as the lens and the picture's proportions are unknown. What is to lie on the picture is
+  /// Of a flat pattern, while the camera is a guess: the part of its picture's place that no pose
+  /// explains, as the lens and the picture's proportions are unknown. Content on the picture is
   /// drawn by gl_view(pose, stretch): X_camera = rotation * (stretch * (X_world, 1)) + translation.
   glm::dmat4x3 stretch{1.0};
   int matches = 0;  ///< features that match, or patches in view if tracked
@@ -87,8 +87,9 @@ struct TrackResult {
 /// it.
 class Hysteresis {
  public:
-  /// predict: false leaves the model of a lost pattern in place, as the paper does.
-  explicit Hysteresis(std::size_t pattern_count, bool predict = true);
+  /// predict: false leaves the model of a lost pattern in place, as the paper does. stills: a
+  /// model is shown in the first frame that sees its pattern.
+  explicit Hysteresis(std::size_t pattern_count, bool predict = true, bool stills = false);
 
   struct State {
     bool shown = false;     ///< draw the model, at `pose`
@@ -110,6 +111,7 @@ class Hysteresis {
   std::vector<Counter> counters_;
   std::vector<State> states_;
   bool predict_ = true;
+  int frames_to_show_;
 };
 
 }  // namespace modar

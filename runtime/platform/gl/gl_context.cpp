@@ -1,5 +1,5 @@
 // An off-screen OpenGL ES 2.0 context by EGL (a pbuffer on the system's display, or on Mesa's
-// surfaceless platform where there is none); what a context offers, and the same lowered to a
+// surfaceless platform without one); what a context offers, and the same lowered to a
 // device profile.
 #include "modar/gl_context.hpp"
 

@@ -1,6 +1,6 @@
 // host BUNDLE M0...M15 > rgba: an app with OpenGL ES 3 that has drawn its camera's picture by
 // itself, into a multisampled framebuffer of its own, with a vertex array object that stays bound.
-// Over it go the bundle's first model, as a frame of 160x120 from a sensor that lies across shows
+// Over it go the bundle's first model, as a frame of 160x120 from a sensor that is across shows
 // it: turned by 90 degrees and cropped. M: model space to GL's eye space, column by column. Prints
 // 170x250 pixels, the bottom row first.
 #include <modar/mapped_file.hpp>

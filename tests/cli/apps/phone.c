@@ -32,7 +32,8 @@ static void check_drawing(const modar_bundle* bundle) {
   NEED(options.size == sizeof options && options.lod_pixels == 1.0f);
   options.clear_colour[0] = 0.2f, options.clear_colour[1] = 0.4f, options.lod_pixels = 4.0f;
   modar_renderer_set_options(renderer, &options);
-  modar_renderer_render(renderer, NULL, &camera, NULL, NULL, 0);
+  modar_drawing nothing = {.size = sizeof nothing, .camera = &camera};
+  modar_renderer_render(renderer, NULL, &nothing);
   modar_renderer_read_rgba(renderer, rgba);
   NEED(rgba[0] == 51 && rgba[1] == 102 && rgba[2] == 0 && rgba[3] == 255);
   modar_renderer_destroy(renderer);
@@ -44,11 +45,11 @@ static int check_search_apart(const modar_bundle* bundle, const modar_camera* ca
                               modar_tracker_options options) {
   const struct timespec pause = {0, 5000000};
   int frames = 0;
-  modar_tracker* tracker = modar_tracker_create_with(bundle, camera, &options, &error);
+  modar_tracker* tracker = modar_tracker_create(bundle, camera, &options, &error);
   modar_pose pose = {.size = sizeof pose};
   NEED(tracker != NULL);
   while (!pose.visible && ++frames < 4000) {
-    NEED(modar_tracker_step(tracker, frame, (size_t)camera->width, &error) == 0);
+    NEED(modar_tracker_step(tracker, frame, (size_t)camera->width, -1, &error) == 0);
     modar_tracker_pose(tracker, 0, &pose);
     if (options.extended) modar_tracker_turn(tracker, (const double[3]){0.0, 0.0, 0.0});
     if (options.async_search) nanosleep(&pause, NULL);
@@ -82,8 +83,8 @@ int main(int argc, char** argv) {
   /* A caller of an older version knows no smoothing. */
   modar_tracker_options older = {.size = offsetof(modar_tracker_options, smooth_ms), .smooth_ms = 1e300};
   modar_tracker_options options = {.size = sizeof options, .search_every = 5, .smooth_ms = 20.0, .estimate_camera = 1};
-  modar_tracker_destroy(modar_tracker_create_with(bundle, &camera, &older, &error));
-  modar_tracker* tracker = modar_tracker_create_with(bundle, &camera, &options, &error);
+  modar_tracker_destroy(modar_tracker_create(bundle, &camera, &older, &error));
+  modar_tracker* tracker = modar_tracker_create(bundle, &camera, &options, &error);
   NEED(tracker != NULL);
   size_t width = (size_t)camera.width, pixels = width * (size_t)camera.height;
   uint8_t* frame = malloc(pixels * 3 / 2);
@@ -91,21 +92,22 @@ int main(int argc, char** argv) {
   modar_pose pose = {.size = sizeof pose};
   NEED(modar_scene_at(bundle, 0, &scene));
   for (double time = 1; fread(frame, pixels * 3 / 2, 1, stdin) == 1; time += 0.04) {
-    NEED(modar_tracker_step_at(tracker, frame, width, time, &error) == 0);
+    NEED(modar_tracker_step(tracker, frame, width, time, &error) == 0);
     modar_tracker_pose(tracker, scene.pattern, &pose);
     printf("pose %d %g %g %g %g\n", pose.visible, pose.fit, pose.translation[0], pose.translation[1],
            pose.translation[2]);
     NEED(modar_tracker_camera(tracker, &camera) > 0.0 && camera.fx == camera.fy);
   }
-  NEED(pose.visible);
+  NEED(pose.visible && modar_tracker_reason(tracker) == MODAR_REASON_VISIBLE);
   modar_item item = {.size = sizeof item};
   modar_hit hit = {.size = sizeof hit};
   modar_item_place(&item, &scene, &pose);
   const double x = camera.cx + camera.fx * pose.translation[0] / pose.translation[2];
   const double y = camera.cy + camera.fy * pose.translation[1] / pose.translation[2];
-  NEED(modar_pick(bundle, &camera, x, y, &item, 1, &hit) == 1 && hit.item == 0);
-  NEED(modar_pick(bundle, &camera, -500, -500, &item, 1, &hit) == 0);
-  NEED(modar_pick(bundle, &camera, x, y, &item, 1, &hit) == 1);
+  const modar_drawing drawing = {.size = sizeof drawing, .camera = &camera, .items = &item, .item_count = 1};
+  NEED(modar_pick(bundle, &drawing, x, y, &hit) == 1 && hit.item == 0);
+  NEED(modar_pick(bundle, &drawing, -500, -500, &hit) == 0);
+  NEED(modar_pick(bundle, &drawing, x, y, &hit) == 1);
   printf("pick %g %g %g %g\n", hit.distance, hit.point[0], hit.point[1], hit.point[2]);
   modar_tracker_options apart = {.size = sizeof apart, .async_search = 1};
   check_search_apart(bundle, &camera, frame, apart);

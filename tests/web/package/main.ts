@@ -1,5 +1,5 @@
 // A visitor of the package's: what a strict TypeScript project writes. tests/web/package_test.py builds and opens it.
-import { drawFrame, load, type Modar, projectionOf, type Sighting } from 'modar';
+import { drawFrame, load, type Modar, projectionOf, type Pose } from 'modar';
 import { View } from 'modar/view';
 import { ModarViewer } from 'modar/viewer';
 
@@ -36,7 +36,7 @@ async function lookAround(): Promise<(string | number)[]> {
 
 async function main(): Promise<string> {
   const modar: Modar = await load('demo.modar');
-  const onUpdated = ({ detail }: CustomEvent<Sighting>): void => console.assert(detail.view.length === 16);
+  const onUpdated = ({ detail }: CustomEvent<Pose>): void => console.assert(detail.view.length === 16);
   modar.addEventListener('updated', onUpdated, { passive: true });
   modar.removeEventListener('updated', onUpdated);
   modar.addEventListener('error', ({ detail }) => console.error(detail.code));

@@ -6,9 +6,9 @@ addEventListener('error', ({ message }) => facts.errors.push(message));
 addEventListener('unhandledrejection', ({ reason }) => facts.errors.push(String(reason)));
 for (const type of ['load', 'found', 'lost', 'error']) viewer.addEventListener(type, () => facts.events.push(type));
 viewer.addEventListener('statechange', () => facts.events.push(viewer.state));
-let found = null, sighting = null, lost = null, failure = null;
+let found = null, detection = null, lost = null, failure = null;
 viewer.addEventListener('found', ({ detail }) => { found = detail; });
-viewer.addEventListener('updated', ({ detail }) => { sighting = detail; });
+viewer.addEventListener('updated', ({ detail }) => { detection = detail; });
 viewer.addEventListener('lost', ({ detail }) => { lost = detail; });
 viewer.addEventListener('error', (event) => { failure = { name: event.error.name, message: event.message }; });
 
@@ -52,7 +52,7 @@ const seen = () => new Promise((resolve) => {
   viewer.addEventListener('frame', function once() {
     if (viewer.state !== 'seen') return;
     viewer.removeEventListener('frame', once);
-    resolve({ ...look(), sighting });
+    resolve({ ...look(), detection });
   });
 });
 

@@ -71,7 +71,7 @@ struct FetchOptions {
   std::uint64_t least_epoch = 0;
   std::uint64_t least_version = 0;
   /// Called for each bundle of which no release in use has one, as soon as it can be shown and
-  /// before the rest of the release comes, with the path of its first sight: a bundle NAME.first,
+  /// before the rest of the release comes, with the path of its preview: a bundle NAME.first,
   /// coarse but good, that is there until the fetch has ended well. May be empty: none are made.
   std::function<void(const std::string& path)> first;
   std::function<void(const FetchProgress&)> progress;  ///< may be empty
@@ -110,12 +110,11 @@ struct StoreReport {
 /// Errors: kExitLocked; kExitBadBundle "store.damaged" (no intact release is left); kIo.
 Result<StoreReport> verify_store(const std::string& store);
 
-/// The release in use and the paths of its bundles, read without the lock; nothing if there is
-/// none.
+/// The release in use and the paths of its bundles, read without the lock; nothing if none exists.
 std::optional<StoreReport> installed_release(const std::string& store);
 
-/// Paths of the first sights that a fetch that was interrupted has left, of bundles that are not
+/// Paths of the previews that a fetch that was interrupted has left, of bundles that are not
 /// installed; read without the lock.
-std::vector<std::string> first_sights(const std::string& store);
+std::vector<std::string> previews(const std::string& store);
 
 }  // namespace modar

@@ -24,7 +24,7 @@ inline constexpr ExitCode kExitExpired{12};   ///< past its expiry
 inline constexpr ExitCode kExitMixed{13};     ///< the server's files belong to different releases
 inline constexpr ExitCode kExitNoSpace{14};   ///< not enough free space
 inline constexpr ExitCode kExitLocked{15};    ///< another process holds the folder
-inline constexpr ExitCode kExitNetwork{16};   ///< gave up; what was downloaded is kept
+inline constexpr ExitCode kExitNetwork{16};   ///< gave up; the download is kept
 inline constexpr ExitCode kExitBadBundle{
     17};  ///< the new bundle fails validation; the old one stays
 
@@ -97,7 +97,7 @@ Result<RootSet> make_root_set(std::vector<PublicKey> keys, unsigned threshold);
 /// "root.json.0123456789abcdef.minisig", with the key's number as in its file, byte by byte.
 std::string signature_path(const std::string& document, const PublicKey& key);
 
-/// Reads the signature at a path; nullopt if there is none.
+/// Reads the signature at a path; nullopt if none exists.
 using SignatureReader = std::function<Result<std::optional<std::string>>(const std::string& path)>;
 /// Checks that enough keys of the set signed `text`, the contents of `document`. Each key counts
 /// once; invalid signatures are ignored.
@@ -171,37 +171,37 @@ Result<Freshness> parse_freshness(std::string_view json);
 std::string freshness_text(const Freshness& freshness);
 
 /// A link of the chain of keys: signed by one key, it names the key that follows.
-struct KeyLink {
+struct KeyRotation {
   std::uint32_t serial = 0;  ///< from 1, without gaps
   std::string key;           ///< public_key_line()
 };
 /// Errors: kInvalidInput "release.text".
-Result<KeyLink> parse_key_link(std::string_view json);
-std::string key_link_text(const KeyLink& link);
+Result<KeyRotation> parse_key_rotation(std::string_view json);
+std::string key_rotation_text(const KeyRotation& link);
 
 /// The root document, signed by the root key that stays offline: names the signing key. Each
 /// document begins an epoch, in which versions start again; the chain continues after its first
 /// `links` links.
-struct RootWord {
+struct RootMetadata {
   std::uint64_t epoch = 0;  ///< from 1; only grows
   std::uint32_t links = 0;
   std::string key;  ///< public_key_line()
 };
 /// Errors: kInvalidInput "release.text".
-Result<RootWord> parse_root_word(std::string_view json);
-std::string root_word_text(const RootWord& word);
+Result<RootMetadata> parse_root_metadata(std::string_view json);
+std::string root_metadata_text(const RootMetadata& word);
 
 /// A link of the chain of root keys: the next set, signed by enough keys of the previous set and by
 /// enough of its own.
-struct RootLink {
+struct RootRotation {
   std::uint32_t serial = 0;  ///< from 1, without gaps
   RootSet roots;
 };
 /// "roots/S.json".
-std::string root_link_path(std::uint32_t serial);
+std::string root_rotation_path(std::uint32_t serial);
 /// Errors: kInvalidInput "release.text".
-Result<RootLink> parse_root_link(std::string_view json);
-std::string root_link_text(const RootLink& link);
+Result<RootRotation> parse_root_rotation(std::string_view json);
+std::string root_rotation_text(const RootRotation& link);
 /// @}
 
 }  // namespace modar

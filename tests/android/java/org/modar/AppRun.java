@@ -106,7 +106,8 @@ public final class AppRun {
     private static boolean deliver(int index) {
         byte[] frame = new byte[size];
         System.arraycopy(clip, index * size, frame, 0, size);
-        boolean taken = android.os.Build.VERSION.SDK_INT >= 21 && CameraManager.full ? ImageReader.current.deliver(frame)
+        boolean taken = android.os.Build.VERSION.SDK_INT >= 21 && CameraManager.full
+                ? ImageReader.current.deliver(frame)
                 : Camera.current.deliver(frame);
         view.frame();
         return taken;
@@ -127,7 +128,8 @@ public final class AppRun {
         for (int i = 0; i < 4; i++) {
             for (int channel = 0; channel <= 16; channel += 8) {
                 int value = pixels[at[i]] >> channel & 255;
-                check(channel == shift[i] ? value > 200 : value < 60, photo + ": " + Integer.toHexString(pixels[at[i]]) + " at " + i);
+                check(channel == shift[i] ? value > 200 : value < 60,
+                        photo + ": " + Integer.toHexString(pixels[at[i]]) + " at " + i);
             }
         }
         app.onBackPressed();
@@ -156,7 +158,7 @@ public final class AppRun {
         app.onPause();
         check(ImageReader.current.closed && ImageReader.current.open == 0, "all images are back");
         app.onResume();
-        check(deliver(0) && deliver(1), "goes on with Camera2");
+        check(deliver(0) && deliver(1), "continues with Camera2");
         app.onPause();
         CameraManager.full = false;
         app.onResume();
@@ -266,8 +268,11 @@ public final class AppRun {
         Handler.pump();
         check(((TextView) app.findViewById(R.id.caption)).text.equals("One & only"), "the caption");
         android.widget.Button mark = mark();
-        check(mark.visibility == android.view.View.VISIBLE && mark.text.equals("1") && mark.described.equals("1: A note"), "a mark: " + mark.described);
-        check(mark.x > 0 && mark.x < Camera.width && mark.y > 0 && mark.y < Camera.height && mark.alpha == 1, "on the picture");
+        check(mark.visibility == android.view.View.VISIBLE && mark.text.equals("1")
+                        && mark.described.equals("1: A note"),
+                "a mark: " + mark.described);
+        check(mark.x > 0 && mark.x < Camera.width && mark.y > 0 && mark.y < Camera.height && mark.alpha == 1,
+                "on the picture");
         mark.click();
         check(deliver(3), "a frame later");
         check(status().equals("A note"), "a touched mark tells its words");
@@ -276,7 +281,7 @@ public final class AppRun {
         click(R.id.pause);
         check(!film().isPlaying(), "the visitor's pause");
         click(R.id.pause);
-        check(film().isPlaying(), "going on");
+        check(film().isPlaying(), "continuing");
         Thread.sleep(300);
         check(deliver(4), "a frame later");
         check(status().equals("A note"), "a label's words");
@@ -288,9 +293,11 @@ public final class AppRun {
         check(!film().isPlaying(), "a film that waits");
         Handler.pump();
         check(mark.visibility == android.view.View.GONE, "no mark without its picture");
-        check(android.app.AlertDialog.shown.asks.contains("https://museum.org/cover") && Context.started == null, "a question");
+        check(android.app.AlertDialog.shown.asks.contains("https://museum.org/cover") && Context.started == null,
+                "a question");
         android.app.AlertDialog.shown.yes.onClick(null, 0);
-        check(Context.started.action.equals("android.intent.action.VIEW") && Context.started.data.path.equals("https://museum.org/cover"),
+        check(Context.started.action.equals("android.intent.action.VIEW")
+                        && Context.started.data.path.equals("https://museum.org/cover"),
                 "the link");
         app.onPause();
         app.onDestroy();
@@ -315,9 +322,11 @@ public final class AppRun {
         int far = 0;
         for (int y = 0; y < height; y++) {
             for (int x = 0; x < width; x++) {
-                int to = 4 * (y * width + x), from = 4 * (y * Camera.height / height * Camera.width + x * Camera.width / width);
+                int to = 4 * (y * width + x),
+                    from = 4 * (y * Camera.height / height * Camera.width + x * Camera.width / width);
                 int off = 0;
-                for (int k = 0; k < 3; k++) off = Math.max(off, Math.abs((recorded[to + k] & 255) - (screen[from + k] & 255)));
+                for (int k = 0; k < 3; k++)
+                    off = Math.max(off, Math.abs((recorded[to + k] & 255) - (screen[from + k] & 255)));
                 if (off > 60) far++;
             }
         }
@@ -333,8 +342,11 @@ public final class AppRun {
         check(saved.length == count, saved.length + " videos");
         java.util.Arrays.sort(saved);
         check(new String(Files.readAllBytes(saved[count - 1].toPath())).endsWith("whole\n"), "a whole file");
-        check(android.media.MediaCodec.open == 0 && android.opengl.EGL14.open == 0 && android.media.MediaExtractor.open == 0, "all is given back");
-        for (String each : Context.folder.list()) check(!each.startsWith("video") && !each.startsWith("media1"), "left: " + each);
+        check(android.media.MediaCodec.open == 0 && android.opengl.EGL14.open == 0
+                        && android.media.MediaExtractor.open == 0,
+                "all is given back");
+        for (String each : Context.folder.list())
+            check(!each.startsWith("video") && !each.startsWith("media1"), "left: " + each);
     }
 
     /** Recorded are the screen's pictures and the film's sound, at their times; the file is whole however it ends. */
@@ -355,7 +367,8 @@ public final class AppRun {
         click(R.id.record);
         view.frame();
         whole("Movies/ModAR", 1);
-        check(android.media.MediaMuxer.tracks.equals(java.util.Arrays.asList("video/avc", "audio/mp4a-latm")), "pictures and sound");
+        check(android.media.MediaMuxer.tracks.equals(java.util.Arrays.asList("video/avc", "audio/mp4a-latm")),
+                "pictures and sound");
         java.util.List<Object[]> pictures = packets(0), sounds = packets(1);
         check(pictures.size() >= shown.length, pictures.size() + " pictures of " + shown.length);
         int width = (Camera.width + 8) / 16 * 16, height = ((byte[]) pictures.get(0)[2]).length / 4 / width;
@@ -373,9 +386,12 @@ public final class AppRun {
         // 800 ms of packets of 23 ms, one after the other, from where the film was.
         int first = ByteBuffer.wrap((byte[]) sounds.get(0)[2]).getInt();
         check(sounds.size() > 10 && first < 10, sounds.size() + " packets from " + first);
-        for (int i = 1; i < sounds.size(); i++) check((Long) sounds.get(i)[1] > (Long) sounds.get(i - 1)[1], "sounds rise");
+        for (int i = 1; i < sounds.size(); i++)
+            check((Long) sounds.get(i)[1] > (Long) sounds.get(i - 1)[1], "sounds rise");
         click(R.id.share);
-        check(Context.started.of.type.equals("video/mp4") && ((android.net.Uri) Context.started.of.stream).path.contains("/video-"), "shared");
+        check(Context.started.of.type.equals("video/mp4")
+                        && ((android.net.Uri) Context.started.of.stream).path.contains("/video-"),
+                "shared");
         // Without sound, by Android 10, until it is long enough.
         android.os.Build.VERSION.SDK_INT = 29;
         click(R.id.sound);
@@ -390,19 +406,20 @@ public final class AppRun {
         check(deliver(0) && deliver(1), "frames");
         app.onPause();
         app.onResume();
-        check(deliver(0), "goes on");
+        check(deliver(0), "continues");
         whole("gallery", 2);
         // The context goes with all that is in it.
         click(R.id.record);
         check(deliver(0) && deliver(1), "frames");
         view.surface(Camera.width, Camera.height, true);
         android.opengl.EGL14.open = 0;
-        check(deliver(0), "goes on");
+        check(deliver(0), "continues");
         whole("gallery", 3);
         android.media.MediaCodec.busy = true;
         click(R.id.record);
-        check(deliver(0), "goes on");
-        check(status().equals("No video: no encoder is free") && android.media.MediaCodec.open == 0, "no encoder: " + status());
+        check(deliver(0), "continues");
+        check(status().equals("No video: no encoder is free") && android.media.MediaCodec.open == 0,
+                "no encoder: " + status());
         app.onPause();
         app.onDestroy();
     }
@@ -429,12 +446,13 @@ public final class AppRun {
         return canvas;
     }
 
-    /** Where the print lies in the first frame of the test's clip, pixels. */
+    /** Where the print is in the first frame of the test's clip, pixels. */
     private static final int PRINT_LEFT = 135, PRINT_TOP = 30, PRINT_RIGHT = 345, PRINT_BOTTOM = 330;
 
     /**
-     * The clip shows a picture that the bundle does not know: photographed, its corners mended, it has the chosen model; on later
-     * visits, too, until it is forgotten. other: a file of a picture.
+     * The clip shows a picture that the bundle does not know: photographed, its corners repaired,
+     * it has the chosen model; on later visits, too, until it is forgotten. other: a file of a
+     * picture.
      */
     private static void own(String other) throws Exception {
         start();
@@ -442,13 +460,16 @@ public final class AppRun {
         click(R.id.menu_go);
         check(gone(R.id.menu), "go");
         byte[] alone = shown();
-        app.onBackPressed();
+        android.window.OnBackInvokedDispatcher.last.onBackInvoked(); // as Android 16 does
         check(!gone(R.id.menu) && !Activity.left, "back to the menu");
-        check(((TextView) shown(R.id.menu_model)).text.equals("Model: pottery") && gone(R.id.menu_forget), "the first model");
+        check(((TextView) shown(R.id.menu_model)).text.equals("Model: pottery") && gone(R.id.menu_forget),
+                "the first model");
         click(R.id.menu_model);
         check(((TextView) shown(R.id.menu_model)).text.startsWith("Model: bust"), "the other model");
         click(R.id.menu_take);
-        check(status().startsWith("Photograph something flat") && ((TextView) shown(R.id.picture)).text.equals("Photograph"), "how");
+        check(status().startsWith("Photograph something flat")
+                        && ((TextView) shown(R.id.picture)).text.equals("Photograph"),
+                "how");
         app.onBackPressed();
         check(!gone(R.id.menu) && ((TextView) app.findViewById(R.id.picture)).text.equals("Picture"), "not now");
         click(R.id.menu_take);
@@ -459,31 +480,37 @@ public final class AppRun {
         shown(R.id.own);
         android.view.View corners = corners();
         check(drawn().bitmap.getWidth() == Camera.width && corners.described.equals("Corner 1"), corners.described);
-        // The photo is as large as its view. Found were the print's corners, which lie on the screen as the sensor does.
+        // The photo is as large as its view. Found were the print's corners, which are on the
+        // screen as the sensor does.
         float[][] found = drawn().circles.toArray(new float[0][]);
         double scale = (double) Camera.width / Camera.height;
-        double[][] print = {{PRINT_TOP, PRINT_RIGHT}, {PRINT_BOTTOM, PRINT_RIGHT}, {PRINT_BOTTOM, PRINT_LEFT}, {PRINT_TOP, PRINT_LEFT}};
+        double[][] print = {{PRINT_TOP, PRINT_RIGHT}, {PRINT_BOTTOM, PRINT_RIGHT}, {PRINT_BOTTOM, PRINT_LEFT},
+                {PRINT_TOP, PRINT_LEFT}};
         for (int i = 0; i < 4; i++) {
-            // Turned clockwise: what is above lies on the right. Clockwise from the top left.
-            double x = Camera.width - scale * print[(i + 2) % 4][0], y = Camera.height / 2.0 + scale * (print[(i + 2) % 4][1] - Camera.width / 2.0);
-            check(Math.hypot(found[i][0] - x, found[i][1] - y) < 8, "corner " + i + ": " + found[i][0] + " " + found[i][1] + " is not " + x + " " + y);
+            // Turned clockwise: the upper side is on the right. Clockwise from the top left.
+            double x = Camera.width - scale * print[(i + 2) % 4][0],
+                   y = Camera.height / 2.0 + scale * (print[(i + 2) % 4][1] - Camera.width / 2.0);
+            check(Math.hypot(found[i][0] - x, found[i][1] - y) < 8,
+                    "corner " + i + ": " + found[i][0] + " " + found[i][1] + " is not " + x + " " + y);
         }
         corners.onTouchEvent(new MotionEvent(MotionEvent.ACTION_DOWN, found[0][0], found[0][1]));
         corners.onTouchEvent(new MotionEvent(MotionEvent.ACTION_MOVE, found[0][0] + 20, found[0][1] + 3));
-        check(drawn().circles.get(0)[0] == found[0][0] + 20 && drawn().circles.get(0)[1] == found[0][1] + 3, "a dragged corner");
+        check(drawn().circles.get(0)[0] == found[0][0] + 20 && drawn().circles.get(0)[1] == found[0][1] + 3,
+                "a dragged corner");
         for (int i = 0; i < 4; i++) corners.performClick();
         check(corners.described.equals("Corner 1"), "once around");
         android.view.KeyEvent key = new android.view.KeyEvent();
         for (int i = 0; i < 10; i++) corners.onKeyDown(android.view.KeyEvent.KEYCODE_DPAD_LEFT, key);
         corners.onKeyDown(android.view.KeyEvent.KEYCODE_DPAD_UP, key);
-        check(Math.hypot(drawn().circles.get(0)[0] - found[0][0], drawn().circles.get(0)[1] - found[0][1]) < 2, "keys bring it back");
+        check(Math.hypot(drawn().circles.get(0)[0] - found[0][0], drawn().circles.get(0)[1] - found[0][1]) < 2,
+                "keys return it");
         click(R.id.own_use);
         joinAll("modar-own");
         Handler.pump();
         check(gone(R.id.own) && new File(Context.folder, "own").list().length == 1, "kept: " + status());
-        check(Camera.opened == 1, "the camera goes on");
+        check(Camera.opened == 1, "the camera continues");
         byte[] standing = shown();
-        check(changed(alone, standing) > 0.02, "the model stands on it: " + changed(alone, standing));
+        check(changed(alone, standing) > 0.02, "the model is on it: " + changed(alone, standing));
         Handler.pump();
         check(view.described.contains("Your picture"), view.described);
         app.onPause();
@@ -498,7 +525,8 @@ public final class AppRun {
         android.content.Intent answer = new android.content.Intent("", new android.net.Uri(other));
         app.onActivityResult(2, Activity.RESULT_OK, answer);
         check(drawn().bitmap.getWidth() == 1024, "as large as it has to be: " + drawn().bitmap.getWidth());
-        check(Math.abs(drawn().circles.get(0)[0] - 0.1 * Camera.width) < 1 && Math.abs(drawn().circles.get(2)[1] - 0.9 * Camera.height) < 1,
+        check(Math.abs(drawn().circles.get(0)[0] - 0.1 * Camera.width) < 1
+                        && Math.abs(drawn().circles.get(2)[1] - 0.9 * Camera.height) < 1,
                 "corners at its margins");
         click(R.id.own_use);
         joinAll("modar-own");
@@ -507,11 +535,12 @@ public final class AppRun {
         app.onBackPressed();
         check(gone(R.id.own) && !gone(R.id.menu), "back");
         for (int i = 1; i <= 8; i++) upright(other.replace("wall.png", "turned" + i + ".jpg"));
-        app.onActivityResult(2, Activity.RESULT_OK, new android.content.Intent("", new android.net.Uri(other + ".none")));
+        app.onActivityResult(
+                2, Activity.RESULT_OK, new android.content.Intent("", new android.net.Uri(other + ".none")));
         check(status().startsWith("This file is no picture"), "no file");
         shown(R.id.menu_forget).click();
         check(new File(Context.folder, "own").list().length == 0 && gone(R.id.menu_forget), "forgotten");
-        check(changed(alone, shown()) < 0.001, "nothing stands there: " + changed(alone, shown()));
+        check(changed(alone, shown()) < 0.001, "no model is there: " + changed(alone, shown()));
         app.onBackPressed();
         check(Activity.left, "from the menu out");
         app.onPause();
@@ -550,7 +579,7 @@ public final class AppRun {
         GLSurfaceView.most = 0;
         view.surface(Camera.width, Camera.height, true); // the context was lost meanwhile
         check(GLSurfaceView.samples == 0, "a surface of one sample");
-        check(Camera.opened == 1 && deliver(0) && deliver(1), "goes on");
+        check(Camera.opened == 1 && deliver(0) && deliver(1), "continues");
         // The new session's first frames tell how the camera sees, and the model's picture follows.
         for (int i = 0; i < 20; i++) check(deliver(1), "settles");
         byte[] upright = picture();
@@ -564,7 +593,7 @@ public final class AppRun {
         check(deliver(1) && changed(upright, picture()) < 0.01, "turned back");
     }
 
-    /** The share of a picture in the gray that lies behind models without a camera: 0.85 of 255. */
+    /** The share of a picture in the gray that is behind models without a camera: 0.85 of 255. */
     private static double ground(byte[] picture) {
         int gray = 0;
         for (int i = 0; i < picture.length; i += 4) {
@@ -594,7 +623,8 @@ public final class AppRun {
     /** A look without the camera: the model alone, turned by fingers, told by a tap; and back. The picture goes to a file. */
     private static void around(String out) throws Exception {
         check(deliver(0) && deliver(1), "the camera");
-        check(view.described.equals("Eine Vase \uD83C\uDFFA") || view.described.equals("A vase \uD83C\uDFFA"), view.described);
+        check(view.described.equals("Eine Vase \uD83C\uDFFA") || view.described.equals("A vase \uD83C\uDFFA"),
+                view.described);
         click(R.id.around);
         check(Camera.opened == 0, "the camera is off");
         view.frame();
@@ -612,7 +642,7 @@ public final class AppRun {
         check(status().equals("pottery"), "a tap tells the model: " + status());
         app.onPause();
         app.onResume();
-        check(Camera.opened == 0, "a pause does not bring the camera");
+        check(Camera.opened == 0, "a pause does not start the camera");
         view.frame();
         check(ground(picture()) > 0.2, "still without it");
         click(R.id.around);
@@ -634,7 +664,7 @@ public final class AppRun {
         check(((android.view.ViewGroup) app.findViewById(R.id.screen)).gone == 1, "GL's memory is given back, once");
         app.onResume();
         view.surface(Camera.width, Camera.height, true);
-        for (int i = 0; i < 20; i++) check(deliver(1), "goes on");
+        for (int i = 0; i < 20; i++) check(deliver(1), "continues");
         check(changed(before, picture()) < 0.01, "the same picture: " + changed(before, picture()));
     }
 
@@ -687,12 +717,17 @@ public final class AppRun {
             savedPicture();
             Handler.pump();
             File[] saved = pictureFiles(folders[i]);
-            check(saved.length == 1 && status().equals("Saved to your pictures"), "saved " + folders[i] + ": " + status());
-            check(changed(shownPixels(Files.readAllBytes(saved[0].toPath())), picture()) == 0, "the screen's own picture");
+            check(saved.length == 1 && status().equals("Saved to your pictures"),
+                    "saved " + folders[i] + ": " + status());
+            check(changed(shownPixels(Files.readAllBytes(saved[0].toPath())), picture()) == 0,
+                    "the screen's own picture");
             click(R.id.share);
             android.content.Intent send = Context.started.of;
-            check(send.action.equals(android.content.Intent.ACTION_SEND) && send.type.equals("image/jpeg") && send.flags == 1, "shared");
-            check(((android.net.Uri) send.stream).path.replace("pending-", "").equals(saved[0].getPath()), "the newest");
+            check(send.action.equals(android.content.Intent.ACTION_SEND) && send.type.equals("image/jpeg")
+                            && send.flags == 1,
+                    "shared");
+            check(((android.net.Uri) send.stream).path.replace("pending-", "").equals(saved[0].getPath()),
+                    "the newest");
             Bitmap.full = true;
             savedPicture();
             Handler.pump();
@@ -705,7 +740,7 @@ public final class AppRun {
         app.onDestroy();
     }
 
-    /** A damaged file of the same name in the folder: the APK's own stands in; with that one damaged, too, it says why. */
+    /** A damaged file of the same name in the folder: the APK's own replaces it; with that one damaged, too, it says why. */
     private static void damage() throws Exception {
         Path pushed = new File(Context.folder, "vase.modar").toPath();
         Files.write(pushed, new byte[5000]);
@@ -726,7 +761,7 @@ public final class AppRun {
         app.onDestroy();
     }
 
-    /** A bundle that opens, with one byte wrong in what is drawn: found in the background, once; then another is shown. */
+    /** A bundle that opens, with one byte wrong in the drawing: found in the background, once; then another is shown. */
     private static void rot() throws Exception {
         start();
         joinAll("modar-verify");
@@ -748,8 +783,8 @@ public final class AppRun {
         Files.write(pushed, bundle);
         start();
         joinAll("modar-verify");
-        check(!status().startsWith("The models cannot be read"), "the APK's own stands in");
-        check(Camera.opened == 1 && deliver(0), "goes on with the APK's bundle");
+        check(!status().startsWith("The models cannot be read"), "the APK's own replaces it");
+        check(Camera.opened == 1 && deliver(0), "continues with the APK's bundle");
         app.onPause();
         String told = new String(Files.readAllBytes(new File(Context.folder, "diagnostics.txt").toPath()));
         check(told.contains("bundle: vase (app)") && told.contains("section.hash"), "which one was wrong: " + told);
@@ -757,7 +792,7 @@ public final class AppRun {
         Files.delete(pushed);
     }
 
-    /** A release from a stick while the app runs; then its file rots: the APK's bundle stands in. */
+    /** A release from a stick while the app runs; then its file rots: the APK's bundle replaces it. */
     private static void update() throws Exception {
         start();
         deliver(0);
@@ -768,9 +803,10 @@ public final class AppRun {
         }
         check(status().equals("Updated"), "updated");
         check(installed().length == 1, "installed");
-        check(deliver(0) && deliver(1), "goes on with the release");
+        check(deliver(0) && deliver(1), "continues with the release");
         app.onPause();
-        check(new String(Files.readAllBytes(new File(Context.folder, "diagnostics.txt").toPath())).contains("vase (release)"),
+        check(new String(Files.readAllBytes(new File(Context.folder, "diagnostics.txt").toPath()))
+                        .contains("vase (release)"),
                 "the bundle of the release");
         app.onDestroy();
         Files.write(Paths.get(installed()[0]), new byte[64]);
@@ -793,36 +829,37 @@ public final class AppRun {
     }
 
     /**
-     * Releases from a web server while the app runs. The server is the test's: it goes on to the next step when a file
-     * of that name appears in `folder`, and answers by NAME.done.
+     * Releases from a web server while the app runs. The server is the test's: it continues to the
+     * next step when a file of that name appears in `folder`, and answers by NAME.done.
      */
     private static void network(Path folder) throws Exception {
         start();
         check(deliver(0) && deliver(1), "the APK's bundle");
         if (Files.exists(folder.resolve("full"))) {
             check(updated().startsWith("No update: ") && status().contains("No space left"), "a full storage");
-            check(installed().length == 0 && deliver(0) && deliver(1), "goes on with the APK's bundle");
+            check(installed().length == 0 && deliver(0) && deliver(1), "continues with the APK's bundle");
             step(folder, "freed");
         }
         check(updated().equals("Updated") && installed().length == 1, "the first release");
-        check(deliver(0) && deliver(1), "goes on with the first release");
+        check(deliver(0) && deliver(1), "continues with the first release");
         check(updated().equals("The newest release is already installed"), "nothing new");
         step(folder, "second");
         check(updated().equals("Updated"), "the second release");
-        check(deliver(0) && deliver(1), "goes on with the second release");
+        check(deliver(0) && deliver(1), "continues with the second release");
         String before = Fetch.version(new File(Context.folder, "store").getPath());
         check(before.equals("2"), "the second release is in use");
         for (String trouble : new String[] {"forged", "gone"}) {
             step(folder, trouble);
             check(updated().startsWith("No update: "), trouble);
-            check(Fetch.version(new File(Context.folder, "store").getPath()).equals(before), trouble + ": the release stays");
-            check(deliver(0) && deliver(1), trouble + ": the app goes on");
+            check(Fetch.version(new File(Context.folder, "store").getPath()).equals(before),
+                    trouble + ": the release stays");
+            check(deliver(0) && deliver(1), trouble + ": the app continues");
         }
         app.onPause();
         app.onDestroy();
     }
 
-    /** The app has no bundle, and the server keeps the last stage back until it is asked for `rest`. */
+    /** The app has no bundle, and the server keeps the last stage back until it is requested `rest`. */
     private static void first(Path folder) throws Exception {
         start();
         check(status().startsWith("There is nothing to show"), "nothing yet");
@@ -831,19 +868,20 @@ public final class AppRun {
             Handler.pump();
             Thread.sleep(50);
         }
-        check(new File(Context.folder, "store/pieces/urn.first").exists() && installed().length == 0, "the first sight alone");
-        check(deliver(0) && deliver(1) && told().contains("urn (first sight)"), "shows the first sight");
+        check(new File(Context.folder, "store/pieces/urn.first").exists() && installed().length == 0,
+                "the preview alone");
+        check(deliver(0) && deliver(1) && told().contains("urn (preview)"), "shows the preview");
         View more = app.findViewById(R.id.models);
         for (int i = 0; i < 600 && more.getVisibility() != View.VISIBLE; i++) {
             Handler.pump();
             Thread.sleep(50);
         }
         click(R.id.models);
-        check(deliver(0) && deliver(1) && told().contains("vase (first sight)"), "shows the other bundle's");
+        check(deliver(0) && deliver(1) && told().contains("vase (preview)"), "shows the other bundle's");
         step(folder, "rest");
         joinAll("modar-update");
         check(status().equals("Updated") && installed().length == 2, "installed");
-        check(deliver(0) && deliver(1) && told().contains("urn (release)"), "goes on with the release");
+        check(deliver(0) && deliver(1) && told().contains("urn (release)"), "continues with the release");
         app.onDestroy();
     }
 

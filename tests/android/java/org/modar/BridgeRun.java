@@ -28,23 +28,41 @@ public final class BridgeRun {
         height = Integer.parseInt(words[4]);
         byte[] all = Files.readAllBytes(Paths.get(words[2]));
         frames = new byte[all.length / (width * height * 3 / 2)][width * height * 3 / 2];
-        for (int i = 0; i < frames.length; i++) System.arraycopy(all, i * frames[i].length, frames[i], 0, frames[i].length);
+        for (int i = 0; i < frames.length; i++)
+            System.arraycopy(all, i * frames[i].length, frames[i], 0, frames[i].length);
         switch (words[0]) {
-            case "poses": poses(words[1], words[5], words.length > 6 ? words[6] : ""); break;
-            case "gyroscope": gyroscope(words[5], words[6]); break;
-            case "pictures": pictures(words[1], words[5]); break;
-            case "misuse": misuse(words[1], words[5]); break;
-            case "close": closeWhileBusy(words[1]); break;
-            case "texts": texts(words[1]); break;
-            case "focal": focal(words[1]); break;
-            case "acts": acts(words[1], words[5], Integer.parseInt(words[6])); break;
-            default: soak(words[1], Integer.parseInt(words[5]));
+            case "poses":
+                poses(words[1], words[5], words.length > 6 ? words[6] : "");
+                break;
+            case "gyroscope":
+                gyroscope(words[5], words[6]);
+                break;
+            case "pictures":
+                pictures(words[1], words[5]);
+                break;
+            case "misuse":
+                misuse(words[1], words[5]);
+                break;
+            case "close":
+                closeWhileBusy(words[1]);
+                break;
+            case "texts":
+                texts(words[1]);
+                break;
+            case "focal":
+                focal(words[1]);
+                break;
+            case "acts":
+                acts(words[1], words[5], Integer.parseInt(words[6]));
+                break;
+            default:
+                soak(words[1], Integer.parseInt(words[5]));
         }
     }
 
     /**
-     * The frames as a camera of 30 a second gives them, with the app's own players: commands of each frame, what the fake
-     * decoder was told, and the middle of each picture.
+     * The frames as a camera of 30 a second gives them, with the app's own players: commands of
+     * each frame, the fake decoder's commands, and the middle of each picture.
      */
     private static void acts(String bundle, String out, int lasts) throws Exception {
         long session = opened(bundle);
@@ -63,15 +81,18 @@ public final class BridgeRun {
             StringBuilder line = new StringBuilder("{\"frame\": " + i + ", \"commands\": [");
             for (int k = 0; commands != null && k < commands.length; k += 3) {
                 line.append(k == 0 ? "" : ", ").append("[" + commands[k] + ", " + commands[k + 1] + "]");
-                if (commands[k] == Native.LINK) check(Native.address(session, commands[k + 2]).startsWith("https://"), "an address");
+                if (commands[k] == Native.LINK)
+                    check(Native.address(session, commands[k + 2]).startsWith("https://"), "an address");
             }
-            if (commands != null) media.obey(commands, false);
+            if (commands != null) media.execute(commands, false);
             media.upload();
             Native.onDrawFrame(session, frames[i], poses.bytes);
             GlContext.read(rgba);
-            line.append("], \"told\": \"" + android.media.MediaPlayer.log.toString().trim() + "\", \"caption\": \"" + media.caption("en"));
+            line.append("], \"told\": \"" + android.media.MediaPlayer.log.toString().trim() + "\", \"caption\": \""
+                    + media.caption("en"));
             android.media.MediaPlayer.log.setLength(0);
-            line.append("\", \"at\": " + (android.media.MediaPlayer.all.isEmpty() ? -1 : android.media.MediaPlayer.all.get(0).at));
+            line.append("\", \"at\": "
+                    + (android.media.MediaPlayer.all.isEmpty() ? -1 : android.media.MediaPlayer.all.get(0).at));
             if (poses.visible(0) && poses.shown(0)) {
                 // A little from the pattern's middle to its top left corner: the fake's pictures have their colour there.
                 double px = 0, py = 0;
@@ -82,11 +103,13 @@ public final class BridgeRun {
                 }
                 int from = 4 * ((height - 1 - (int) py) * width + (int) px);
                 pointed(session, poses, frames[i], i % 8);
-                line.append(", \"pixel\": [" + (rgba.get(from) & 255) + ", " + (rgba.get(from + 1) & 255) + ", " + (rgba.get(from + 2) & 255) + "]");
+                line.append(", \"pixel\": [" + (rgba.get(from) & 255) + ", " + (rgba.get(from + 1) & 255) + ", "
+                        + (rgba.get(from + 2) & 255) + "]");
             }
             System.out.println(line + "}");
         }
-        check(android.media.MediaPlayer.all.get(0).bytes > 1000 && android.media.MediaPlayer.all.get(0).volume == 0, "a silent film");
+        check(android.media.MediaPlayer.all.get(0).bytes > 1000 && android.media.MediaPlayer.all.get(0).volume == 0,
+                "a silent film");
         media.setSound(true);
         check(android.media.MediaPlayer.all.get(0).volume == 1, "sound");
         check(media.transcript(0, "en").equals("One & only"), "a transcript");
@@ -95,7 +118,7 @@ public final class BridgeRun {
         Native.close(session);
     }
 
-    /** The film's label lies where the cover's diagonals cross, however the screen shows the frame. */
+    /** The film's label is where the cover's diagonals cross, however the screen shows the frame. */
     private static void pointed(long session, Poses poses, byte[] frame, int way) throws Exception {
         int[] about = Native.node(session, 0);
         int label = 0;
@@ -115,10 +138,12 @@ public final class BridgeRun {
             y = before;
         }
         boolean lies = degrees % 180 != 0;
-        double scale = Math.max((double) screenWidth / (lies ? height : width), (double) screenHeight / (lies ? width : height));
+        double scale = Math.max(
+                (double) screenWidth / (lies ? height : width), (double) screenHeight / (lies ? width : height));
         float[] at = new float[3];
         check(Native.label(session, label, false, at), "a label is seen");
-        double off = Math.hypot(at[0] - screenWidth / 2.0 - (way > 3 ? -x : x) * scale, at[1] - screenHeight / 2.0 - y * scale);
+        double off = Math.hypot(
+                at[0] - screenWidth / 2.0 - (way > 3 ? -x : x) * scale, at[1] - screenHeight / 2.0 - y * scale);
         check(off < 0.5, "the label is off by " + off + " in way " + way);
         check(!Native.label(session, label - 1, false, at), "no label");
         Native.onSurfaceChanged(session, width, height, 0, false);
@@ -251,16 +276,17 @@ public final class BridgeRun {
         String language;
         for (int i = 0; (language = Native.language(session, i)) != null; i++) {
             for (String text : new String[] {language, Native.patternText(session, 0, false, language),
-                    Native.patternText(session, 0, true, language)}) {
+                         Native.patternText(session, 0, true, language)}) {
                 StringBuilder line = new StringBuilder();
-                for (int at = 0; text != null && at < text.length(); at++) line.append(String.format("%04x", (int) text.charAt(at)));
+                for (int at = 0; text != null && at < text.length(); at++)
+                    line.append(String.format("%04x", (int) text.charAt(at)));
                 System.out.println(text == null ? "none" : line);
             }
         }
         Native.close(session);
     }
 
-    /** What is known of the lens after each frame, as a share of the frame's width. A session that is told begins with it. */
+    /** The knowledge of the lens after each frame, as a share of the frame's width. A session with a given lens begins with it. */
     private static void focal(String bundle) throws Exception {
         long session = opened(bundle);
         Poses poses = new Poses(Native.patternCount(session));
@@ -304,8 +330,8 @@ public final class BridgeRun {
             if (layout == NV21) {
                 Native.onDrawFrame(session, frame, poses.bytes);
             } else if (layout == PLANES) {
-                Native.onDrawPlanes(session, luma(frame, 0), width, apart(frame, 1, 8), apart(frame, 0, 8), width / 2 + 8, 1,
-                        poses.bytes);
+                Native.onDrawPlanes(session, luma(frame, 0), width, apart(frame, 1, 8), apart(frame, 0, 8),
+                        width / 2 + 8, 1, poses.bytes);
             } else {
                 ByteBuffer[] pair = pairs(frame, 32, layout == PAIRS_NV12);
                 Native.onDrawPlanes(session, luma(frame, 32), width + 32, pair[0], pair[1], width + 32, 2, poses.bytes);
@@ -325,7 +351,7 @@ public final class BridgeRun {
         return pictures;
     }
 
-    /** What was drawn of all frames, RGBA from the bottom up; every layout gives the same, and so does a new context. */
+    /** The drawings of all frames, RGBA from the bottom up; every layout gives the same, and so does a new context. */
     private static void pictures(String bundle, String out) throws Exception {
         ByteBuffer[] wanted = drawn(bundle, NV21, -1);
         FileChannel sink = new FileOutputStream(out).getChannel();
@@ -506,8 +532,9 @@ public final class BridgeRun {
     }
 
     /**
-     * Frames through both halves; prints by how much heap, resident kilobytes and JNI references grew in the second half
-     * of them. What is drawn is small: its pixels cost most of a frame in Mesa, and hold nothing.
+     * Frames through both halves; prints by how much heap, resident kilobytes and JNI references
+     * grew in the second half of them. The drawing is small: its pixels cost most of a frame in
+     * Mesa, and hold nothing.
      */
     private static void soak(String bundle, int count) throws Exception {
         int across = width / 8;

@@ -1,0 +1,28 @@
+// What follows from other parts of a bundle is computed again: hashes show damage to bytes, this
+// shows records and payloads that contradict each other.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "formats/bundle_view.hpp"
+#include "formats/check.hpp"
+
+namespace modar {
+
+struct ContentOptions {
+  unsigned jobs = 1;        ///< threads; the findings do not depend on it
+  bool first_only = false;  ///< stop at the first finding
+  /// The byte that was changed in a bundle that was good: rules that do not read its section are
+  /// left out. Nothing: all rules are run.
+  std::optional<std::uint64_t> changed = {};
+};
+
+/// Computes again what `modar bake` derived: orders, cones and distances of meshes, mip levels,
+/// tracker records, shadows, scenes by the meta text. Bundles of other writers may choose
+/// otherwise and are not looked at, nor previews. bundle: of bytes that check_bundle() finds
+/// good. Answers true if nothing was found.
+bool check_content(const BundleView& bundle, const IssueSink& sink,
+                   const ContentOptions& options = {});
+
+}  // namespace modar

@@ -1,0 +1,101 @@
+/** Draws what modar.js sees: the frame in one canvas, the bundle's models over it in another. */
+import type { Frame, Modar } from './modar.js';
+
+/** How the models of all patterns are changed. */
+export interface Gesture {
+  /** The picture and the models left to right, as a mirror shows them. */
+  mirror?: boolean;
+  /** About the pattern's normal, radians. */
+  turn?: number;
+  size?: number;
+}
+
+/** A named part of a pattern's content. */
+export interface SceneNode {
+  name: string;
+  /** Index. */
+  pattern: number;
+  kind: 'model' | 'picture' | 'label' | 'video' | 'sound';
+  /** Of a label: a number or a short word. */
+  mark: string;
+}
+
+/**
+ * Scenes may act (nodes and actions of the bundle). Events: `text`, detail {node}: the words of a label are to be shown; `link`,
+ * detail {address}: the visitor is to be asked whether to open it; `caption`, detail {node, text, language}: the words that are
+ * heard now of a video or sound, '' for none; `drawn`: labels() has changed; `refined`: of a packed bundle, first the coarsest of everything
+ * can be drawn, then all; of one that is larger than maxBytes, a finer picture than before.
+ */
+export class View extends EventTarget {
+  /**
+   * bundle: bytes of a raw one, or what load() answers, which also takes packed bundles; both may
+   * still be on their way. Drawn data goes to the GPU and is not kept: after a lost context it is
+   * requested again, if load() was given an address. picture, models: laid over each other by the
+   * page, of one size. fixedLight: the models' light does not follow the camera's picture. webgl1:
+   * for tests. Errors: ModarError. maxBytes (64 MB): of a bundle that is larger, no more than these
+   * are on the GPU at once; levels of detail and of textures come by ranges of the file when a
+   * picture needs them, the coarse ones first, and invisible parts make room. Of models, bakes
+   * with --no-lods have one level, which is always there. A host without ranges, or a browser
+   * without WebGL 2, has all of it at once. 0: no limit.
+   */
+  static create(bundle: Modar | Uint8Array | Promise<Modar | Uint8Array>, options: {
+    picture: HTMLCanvasElement; models: HTMLCanvasElement; simd?: boolean; webgl1?: boolean; fixedLight?: boolean; maxBytes?: number;
+  }): Promise<View>;
+  /** The picture alone, of a frame that nothing is known of. */
+  show(source: VideoFrame | HTMLCanvasElement, gesture?: Gesture): void;
+  /** In the handler of the event `frame`, with its detail. */
+  draw(frame: Frame, gesture?: Gesture): void;
+  /**
+   * A picture that Modar.addPattern() has added gets the content of a scene of the bundle, at its place: call it once for each,
+   * in their order. @returns false: there are 8 already
+   */
+  stand(name: string, scene: number): boolean;
+  /** Forgets all of stand(). kept: patterns of the bundle. */
+  forgetPatterns(kept: number): void;
+  /** The box of a pattern's content, in its space; null where nothing does. */
+  bounds(pattern: number): { low: number[]; high: number[] } | null;
+  /**
+   * The models of one pattern alone, as a camera sees them that stands anywhere: for a look without a camera. view: pattern
+   * space to GL's eye space, column-major. focal: CSS pixels.
+   */
+  drawFrom(pattern: number, view: Float32Array, focal: number): void;
+  /** The same of several patterns, each with a view of its own. */
+  drawEach(views: [pattern: number, view: Float32Array][], focal: number): void;
+  /** Resolved when something of every model of a packed bundle is there, and drawn. */
+  readonly shown: Promise<void>;
+  /** Resolved when all of the bundle is there, and drawn: a packed one comes on after create(), and videos and actions that need it wait. */
+  readonly whole: Promise<void>;
+  /** Those of the bundle, then those of stand(). */
+  readonly patterns: { name: string; widthMm?: number }[];
+  readonly nodes: SceneNode[];
+  /** Words of a node in the first of these languages that it has, else in any. */
+  wordsOf(node: number, languages?: string[]): { language: string; title: string; text: string; alt: string };
+  /** The visitor tapped the canvas of the models, CSS pixels from its top left. Answers the node there, or null. */
+  tap(x: number, y: number): number | null;
+  /** The visitor tapped a node, as by a label's own button. */
+  tapNode(node: number): void;
+  /** Actions begin anew, and videos and sounds stop. */
+  forgetActs(): void;
+  /** For captions, of what plays from now on: the first of these that a video or sound has, else any. */
+  set languages(languages: string[]);
+  /** Of a video or sound: a WebVTT file of captions, and its words alone; null if none. */
+  captionsOf(node: number): { language: string; captions: string; transcript: string } | null;
+  /** 0 to 1; iPhones know their own alone. */
+  set volume(volume: number);
+  /** Videos and sounds are silent until this is true: set it on a visitor's click. A tap on what plays a sound sets it, too. */
+  sound: boolean;
+  /** The sound of videos and sounds as a stream, heard or not, for a film; null where the bundle has none. Ask in a click's handler. */
+  readonly film: MediaStream | null;
+  /** While this is true, videos and sounds pause. */
+  held: boolean;
+  /** Labels on the screen, CSS pixels of the canvas; covered: something is in front of its point. */
+  labels(): { node: number; x: number; y: number; covered: boolean }[];
+  /** Both canvases in one picture. */
+  photograph(type?: 'image/jpeg' | 'image/png'): Promise<Blob>;
+  /** The version of WebGL that draws. */
+  readonly webgl: 1 | 2;
+  readonly heapBytes: number;
+  readonly gpuBytes: number;
+  /** Of the last drawing. */
+  readonly triangles: number;
+}

@@ -1,0 +1,980 @@
+// <modar-viewer src="vase.modar">: the models of a bundle before a visitor's camera, and on a
+// turntable without one. `modar web` makes its page of this element. Types: modar-viewer.d.ts.
+import {describe, titleOf} from './bundle.js';
+import {Camera, hostApp, ownBrowser} from './camera.js';
+import {POSE, POSE_FLOATS} from './engine.js';
+import {allowMotion, load, ModarError} from './modar.js';
+import {View} from './modar-view.js';
+import {Turntable} from './turntable.js';
+import {build} from './viewer-parts.js';
+import {directionOf, fill, labelOf, showWords, wordsFor} from './viewer-words.js';
+
+/** Milliseconds without a detection before the visitor sees a reason: shorter ones flicker. */
+const PATIENCE_MS = 900;
+/** Milliseconds of searching after which "go closer" is the likeliest advice. */
+const FAR_MS = 5000;
+/** Mean gray value below which a room is called dark. */
+const DARK = 35;
+const TURN_A_KEY = Math.PI / 18;
+const SIZE_A_KEY = 1.1;
+/** How far a finger may slip that taps, CSS pixels. */
+const TAP_PIXELS = 6;
+const SMALLEST = 0.2;
+const LARGEST = 5;
+/** Pictures that a hint has room for. */
+const MOST_PLATES = 4;
+
+const BY_NAME = {
+  NotAllowedError: 'refused',
+  SecurityError: 'refused',
+  NotFoundError: 'none',
+  OverconstrainedError: 'none',
+  NotReadableError: 'busy',
+  AbortError: 'busy',
+};
+const BY_CODE = {
+  'web.webgl': 'webgl',
+  'web.wasm': 'old',
+  'web.download': 'network',
+  'web.changed': 'network',
+  'web.login': 'login',
+  'web.policy': 'policy',
+  'web.memory': 'memory',
+  'web.insecure': 'insecure',
+  'web.old': 'old',
+  'web.ended': 'ended',
+  'web.worker': 'other',
+};
+/** What the browser of another app may lack, and the phone's own has. */
+const OF_HOSTS = ['refused', 'none', 'busy', 'old'];
+/** The error text if no words could be loaded. */
+const NO_WORDS = ['The page could not be loaded', 'Check the network and load it again.'];
+
+function kindOf(error) {
+  const byCode = ({code}) => BY_CODE[code] ?? (code.startsWith('gl.') ? 'webgl' : 'bundle');
+  const kind = error instanceof ModarError ? byCode(error) : BY_NAME[error?.name] ?? 'other';
+  return hostApp() && OF_HOSTS.includes(kind) ? 'host' : kind;
+}
+
+function setText(element, text) {
+  if (element.textContent !== text)
+    element.textContent = text;  // else readers repeat it for each frame
+}
+
+const pictureOf = async ({image}) => (typeof image === 'function' ? image() : image);
+
+/** A server that renders pages has no elements, and may import this all the same. */
+export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
+  static observedAttributes = ['src', 'poster', 'alt', 'lang'];
+
+  #root = build(this);
+  #words = null;
+  #wordsGiven = false;
+  /** Until words are there. */
+  #ready = null;
+  #state = 'start';
+  #srcObject = null;
+  /** {source, done}: the loaded bundle, and the promise of it. */
+  #loading = null;
+  #modar = null;
+  #view = null;
+  #patterns = null;
+  #patternsGiven = null;
+  #camera = new Camera();
+  #table = null;
+  #gesture = {turn: 0, size: 1, mirror: false};
+  #shown = -1;
+  /** The label has a node's words, not its pattern's. */
+  #noted = false;
+  /**
+   * The pattern that the label was shown for last; whether it is folded, and whether the visitor
+   * has asked for that.
+   */
+  #labelled = -1;
+  #folded = false;
+  #asked = false;
+  /** The sound of now, by node. */
+  #cues = new Map();
+  #unseenSince = 0;
+  /** What the visitor has asked for last. */
+  #again = () => this.start();
+
+  constructor() {
+    super();
+    this.#listen();
+  }
+
+  #$(id) { return this.#root.getElementById(id); }
+
+  connectedCallback() {
+    document.addEventListener('visibilitychange', this.#onVisibility);
+    addEventListener('resize', this.#onResize);
+    this.#ready ??= this.#loadWords();
+  }
+
+  disconnectedCallback() {
+    document.removeEventListener('visibilitychange', this.#onVisibility);
+    removeEventListener('resize', this.#onResize);
+    this.stop();
+    this.#unload();
+    this.#loading = null;
+  }
+
+  attributeChangedCallback(name) {
+    if (name === 'poster' || name === 'alt') {
+      const [poster, src] = [this.#$('poster'), this.getAttribute('poster')];
+      Object.assign(poster, {hidden: !src, alt: this.getAttribute('alt') ?? ''});
+      if (src) poster.src = src;
+    } else if (name === 'lang' && this.isConnected) {
+      this.#ready = this.#loadWords();
+    }
+  }
+
+  // ---- what pages set and read ----
+
+  get src() { return this.getAttribute('src') ?? ''; }
+
+  set src(address) { this.setAttribute('src', address); }
+
+  get srcObject() { return this.#srcObject; }
+
+  set srcObject(source) { this.#srcObject = source; }
+
+  get state() { return this.#state; }
+
+  get modar() { return this.#modar; }
+
+  /** Of a packed bundle: resolved when something of every model is there, and drawn. */
+  get shown() { return this.#view?.shown; }
+
+  /** Of a packed bundle: resolved when all of it is there, and drawn. */
+  get whole() { return this.#view?.whole ?? Promise.resolve(); }
+
+  /** The track of the camera that is open. */
+  get camera() { return this.#camera.track ?? null; }
+
+  /** The stacked canvases of picture and models. */
+  get layers() { return [this.#$('picture'), this.#$('models')]; }
+
+  /** The sound of videos and sounds as a stream, or null. Asked for in a click's handler. */
+  get film() { return this.#view?.film ?? null; }
+
+  get patterns() { return this.#patterns ?? []; }
+
+  /** null: as the bundle says. */
+  set patterns(patterns) {
+    this.#patternsGiven = patterns;
+    this.#usePatterns(patterns);
+  }
+
+  set words(words) {
+    this.#wordsGiven = true;
+    this.#ready = Promise.resolve();
+    this.#useWords(words, this.#language);
+  }
+
+  #setState(state) {
+    if (state === this.#state) return;
+    this.#state = state;
+    this.setAttribute('state', state);
+    this.dispatchEvent(new Event('statechange'));
+  }
+
+  // ---- words ----
+
+  get #language() { return this.closest('[lang]')?.lang || navigator.language; }
+
+  async #loadWords() {
+    if (this.#wordsGiven) return;
+    const {words, language} = await wordsFor(this.#language).catch(() => ({}));
+    if (words && !this.#wordsGiven) this.#useWords(words, language);
+  }
+
+  #useWords(words, language) {
+    this.#words = words;
+    Object.assign(this.#$('all'), {lang: language, dir: directionOf(language)});
+    showWords(this.#root, words);
+    this.#$('models').setAttribute('aria-roledescription', words.scene);
+    this.#showPatternNames();
+    if (this.#view) this.#useLanguages();
+    this.#showLabel(this.#shown);
+    this.#$('marks').replaceChildren();
+    if (this.#$('stage').open) this.#showMarks();
+  }
+
+  #say(key, values) { return fill(this.#words?.[key] ?? '', values); }
+
+  #labelOf(pattern) { return labelOf(this.patterns[pattern], this.#language); }
+
+  #usePatterns(patterns) {
+    this.#patterns = patterns;
+    this.#shown = -1;
+    const few = this.patterns.slice(0, MOST_PLATES);
+    this.#$('plates').replaceChildren(...few.map((pattern) => {
+      const picture = document.createElement('img');
+      Object.assign(
+          picture, {width: pattern.width, height: pattern.height, alt: '', decoding: 'async'});
+      pictureOf(pattern).then((address) => {
+        picture.src = address;
+      });
+      return picture;
+    }));
+    this.#$('plates').classList.toggle('many', few.length > 1);
+    this.#showPatternNames();
+  }
+
+  #showPatternNames() {
+    const chosen = this.#$('scene').selectedIndex;
+    const labels = this.patterns.map((_, i) => this.#labelOf(i));
+    const textOf = ({name, picture}) =>
+        (labels.filter((each) => each.name === name).length > 1 ? `${name} (${picture})` : name);
+    this.#$('scene').replaceChildren(
+        ...labels.map((label, i) => new Option(textOf(label), i, false, i === chosen)));
+  }
+
+  // ---- the bundle ----
+
+  /** The bundle, once: begun before the visitor starts, and waited for then. */
+  load() {
+    const source = this.#srcObject ?? this.src;
+    if (this.#loading?.source === source) return this.#loading.done;
+    const before = this.#loading?.done.catch(() => {});
+    const done = Promise.resolve(before).then(async () => {
+      this.#unload();
+      try {
+        await this.#open(source);
+      } catch (error) {
+        if (this.#loading?.done === done) this.#loading = null;  // the next start tries again
+        this.#showProgress('', 1);
+        throw error;
+      }
+      if (this.#loading?.done !== done)
+        this.#unload();  // another was chosen meanwhile, or the viewer was removed
+      else this.dispatchEvent(new Event('load'));
+    });
+    this.#loading = {source, done};
+    return done;
+  }
+
+  /** @see modar-viewer.d.ts */
+  async addPattern(image, {name = '', widthMm = 0, scene = 0} = {}) {
+    await this.load();
+    const model = this.#modar.scenes[scene]?.model;
+    if (model === undefined)
+      throw new ModarError({
+        code: 'web.scene',
+        cause: `the bundle has no scene ${scene}`,
+        cure: 'count from 0 in modar.scenes'
+      });
+    const pattern = await this.#modar.addPattern(image, {name, widthMm});
+    this.#view.stand(name, scene);
+    const [width, height] =
+        [image.naturalWidth ?? image.width, image.naturalHeight ?? image.height];
+    const copy = Object.assign(document.createElement('canvas'), {width, height});
+    copy.getContext('2d').drawImage(image, 0, 0);
+    const address = URL.createObjectURL(await new Promise((resolve) => {
+      copy.toBlob(resolve);
+    }));
+    this.#usePatterns([
+      ...this.patterns, {name, title: name, models: titleOf(model), width, height, image: address}
+    ]);
+    return pattern;
+  }
+
+  #unload() {
+    this.#modar?.close();
+    this.#modar = this.#view = null;
+  }
+
+  async #open(source) {
+    const opening = load(typeof source === 'function' ? await source() : source, {
+      onProgress: (loaded, total) => this.#tellProgress(loaded, total),
+    });
+    const most = this.getAttribute('max-bytes');
+    const creating = View.create(opening, {
+      picture: this.#$('picture'),
+      models: this.#freshCanvas(),
+      ...(most && {maxBytes: Number(most)})
+    });
+    creating.catch(() => {});  // told below, after what ails the bundle
+    const opened = await opening;
+    let view;
+    try {
+      view = this.#view = await creating;
+    } catch (error) {
+      opened.close();
+      throw error;
+    }
+    this.#modar = opened;
+    if (!this.#patternsGiven) this.#usePatterns(describe(() => view.bytes, opened));
+    this.#listenToScenes(view);
+    view.addEventListener('error', ({detail}) => this.#failRest(detail));
+    this.#followRest(view);
+    opened.addEventListener('frame', ({detail}) => this.#onFrame(detail));
+    opened.addEventListener('dropped', ({detail}) => {
+      if (this.#camera.stream) this.#view.show(detail.source, this.#gesture);
+    });
+    opened.addEventListener('error', ({detail}) => this.fail(detail));
+    for (const type of ['found', 'updated', 'lost']) {
+      opened.addEventListener(
+          type, ({detail}) => this.dispatchEvent(new CustomEvent(type, {detail})));
+    }
+  }
+
+  /** While the rest comes, the present part can be used. */
+  async #followRest(view) {
+    const wrong = await view.whole.catch((error) => error);
+    if (view !== this.#view) return;
+    this.#showProgress('', 1);
+    if (wrong) this.#failRest(wrong);
+    else this.dispatchEvent(new Event('whole'));
+  }
+
+  #tellProgress(loaded, total) {
+    this.#showProgress(
+        loaded < total ? this.#say('loading', {percent: Math.floor((100 * loaded) / total)}) :
+                         this.#say('preparing'),
+        loaded / total);
+    this.dispatchEvent(new ProgressEvent('progress', {lengthComputable: true, loaded, total}));
+  }
+
+  /** On the cover in words, on the stage as a bar. */
+  #showProgress(text, share) {
+    setText(this.#$('progress'), text);
+    Object.assign(this.#$('rest'), {hidden: share >= 1, value: share});
+    this.#$('rest').setAttribute('aria-label', text);
+  }
+
+  /** A canvas keeps its first context: another bundle's renderer gets a new one. */
+  #freshCanvas() {
+    const used = this.#$('models');
+    if (!used.dataset.used) {
+      used.dataset.used = 'yes';
+      return used;
+    }
+    const canvas = used.cloneNode(false);
+    used.replaceWith(canvas);
+    this.#listenToGestures(canvas);
+    return canvas;
+  }
+
+  // ---- start and stop ----
+
+  /**
+   * Opens the camera and shows it with its models. Call it in a click's handler. loaded: the
+   * promise to await together with the camera.
+   */
+  async start(loaded = this.load()) {
+    this.#again = () => this.start();
+    loaded.catch(() => {});  // told below, after the camera's own troubles
+    this.#setBusy(true);
+    try {
+      await allowMotion();  // first: iOS asks for it within the click only
+      await this.#openCamera();
+      await Promise.all([loaded, this.#ready]);
+      if (!this.isConnected) return this.stop();
+      await this.#follow();
+      this.#unseenSince = performance.now();
+      this.#$('reason').textContent = this.#lookWords;
+      this.#enter('looking', -1);
+    } catch (error) { this.fail(error); } finally {
+      this.#setBusy(false);
+    }
+  }
+
+  /** Shows the content of a pattern on a turntable, without a camera. */
+  async look(pattern = 0, loaded = this.load()) {
+    this.#again = () => this.look(pattern);
+    this.#setBusy(true);
+    try {
+      await Promise.all([loaded, this.#ready]);
+      if (!this.isConnected) return;
+      this.#$('which').hidden = this.patterns.length < 2;
+      this.#enter('around', pattern);
+      this.#table = new Turntable(this.#view, this.#$('ground'));
+      await this.#turnScene(pattern);
+    } catch (error) { this.fail(error); } finally {
+      this.#setBusy(false);
+    }
+  }
+
+  /** Back to the cover. */
+  stop() {
+    this.#closeCamera();
+    this.#table?.close();
+    this.#table = null;
+    this.#$('which').hidden = true;
+    if (this.#root.fullscreenElement) document.exitFullscreen();
+    this.#$('stage').close();
+    if (this.#$('leave').open) this.#$('leave').close();
+    this.#view?.forgetActs();  // else what turns would be drawn on
+    this.#hideLabel();
+    this.#shown = this.#labelled = -1;
+    this.#$('marks').replaceChildren();
+    this.#setState('start');
+  }
+
+  /** Of an incomplete bundle, the present part stays. */
+  #failRest(error) {
+    this.#loading = null;                 // the next start tries again
+    if (this.#state === 'start') return;  // and tells
+    if (['network', 'login'].includes(kindOf(error))) this.#tellProblem(error);
+    else this.fail(error);
+  }
+
+  /** Stops, and shows the visitor the fault and its cure. */
+  fail(error) {
+    this.stop();
+    this.#tellProblem(error);
+  }
+
+  #tellProblem(error) {
+    if (!this.isConnected) return;  // removed meanwhile: there is nobody to tell
+    const kind = kindOf(error);
+    const [title, cure] = this.#words?.errors[kind] ?? NO_WORDS;
+    const host = {app: hostApp(), browser: ownBrowser()};
+    this.#$('problem-title').textContent = fill(title, host);
+    this.#$('problem-cure').textContent = fill(cure, host);
+    const plain = ['refused', 'none', 'insecure'].includes(kind);
+    this.#$('problem-detail').textContent = kind === 'host' ? location.href :
+        plain                                               ? '' :
+                                                              String(error?.message ?? error);
+    this.#$('copy').hidden = kind !== 'host';
+    this.#$('qr').hidden = true;
+    if (kind === 'none')
+import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch(() => {});
+    this.#$('again').hidden = kind === 'host';
+    // Models can be looked at wherever they can be drawn.
+    this.#$('look-instead').hidden =
+        !this.#words || ['webgl', 'network', 'login', 'bundle', 'memory', 'other'].includes(kind);
+    this.#$('problem').dataset.kind = kind;
+    if (this.#state === 'start') this.#setState('error');
+    if (!this.#$('problem').open) this.#$('problem').showModal();
+    this.dispatchEvent(new ErrorEvent('error', {error, message: String(error?.message ?? error)}));
+  }
+
+  /** Both layers in one picture. */
+  photograph(type) { return this.#view.photograph(type); }
+
+  #setBusy(busy) {
+    for (const id of ['start', 'look']) this.#$(id).disabled = busy;
+  }
+
+  #enter(state, pattern) {
+    this.#$('full').hidden = !document.fullscreenEnabled;
+    this.#setState(state);
+    const names = state === 'around' ? {stage: 'lookAround', close: 'back'} :
+                                       {stage: 'stage', close: 'close'};
+    for (const [id, word] of Object.entries(names)) this.#$(id).dataset.label = word;
+    if (this.#words) showWords(this.#root, this.#words);
+    this.#showScene(pattern);
+    if (!this.#$('stage').open) this.#$('stage').showModal();
+    this.#$('models').focus({preventScroll: true});
+  }
+
+  /**
+   * For another browser. Where the clipboard is closed, the address is selected, to be copied
+   * manually.
+   */
+  async #copyAddress() {
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.#$('copy').textContent = this.#say('copied');
+    } catch { getSelection().selectAllChildren(this.#$('problem-detail')); }
+  }
+
+  // ---- the camera ----
+
+  async #openCamera() {
+    await this.#camera.open(
+        this.#$('video'),
+        () => this.fail(new ModarError({code: 'web.ended', cause: 'the camera ended'})));
+    this.#gesture.mirror = this.#camera.mirrored;
+    performance.mark('modar: camera');
+    this.dispatchEvent(new Event('camerachange'));
+  }
+
+  /** Tracks in the camera's frames, with the tools that it has. */
+  async #follow() {
+    const {track} = this.#camera;
+    await this.#modar.start(this.#$('video'), {...this.#camera.focal, extended: true});
+    this.#$('flip').hidden = (await this.#camera.list()).length < 2;
+    this.#$('torch').hidden = !track.getCapabilities?.().torch;
+    this.#$('torch').setAttribute('aria-pressed', 'false');
+  }
+
+  #closeCamera() {
+    this.#modar?.stop();
+    if (!this.#camera.stream) return;
+    this.#camera.close();
+    this.#$('video').srcObject = null;
+    this.dispatchEvent(new Event('camerachange'));
+  }
+
+  async #reopenCamera() {
+    this.#closeCamera();
+    try {
+      await this.#openCamera();
+      await this.#follow();
+    } catch (error) { this.fail(error); }
+  }
+
+  #flip() {
+    this.#camera.flip();
+    return this.#reopenCamera();
+  }
+
+  async #toggleTorch() {
+    const lit = this.#$('torch').getAttribute('aria-pressed') !== 'true';
+    await this.#camera.track.applyConstraints({advanced: [{torch: lit}]});
+    this.#$('torch').setAttribute('aria-pressed', String(lit));
+  }
+
+  async #showCameras() {
+    const devices = await this.#camera.list();
+    const current = this.#camera.track.getSettings().deviceId;
+    this.#$('choose-list').replaceChildren(...devices.map((device, i) => {
+      const label = document.createElement('label');
+      const input = Object.assign(
+          document.createElement('input'),
+          {type: 'radio', name: 'camera', checked: device.deviceId === current});
+      input.addEventListener('change', () => {
+        this.#camera.choose(device.deviceId);
+        this.#$('choose').close();
+        this.#reopenCamera();
+      });
+      label.append(input, device.label || this.#say('camera', {number: i + 1}));
+      return label;
+    }));
+    this.#$('choose').showModal();
+  }
+
+  /** A page that nobody looks at has no business with the camera. */
+  #onVisibility = () => {
+    if (!['looking', 'seen'].includes(this.#state)) return;
+    if (document.hidden) this.#closeCamera();
+    else this.#reopenCamera();
+  };
+
+  // ---- a look without a camera ----
+
+  #onResize = () => this.#table?.draw();
+
+  async #turnScene(pattern) {
+    const picture = this.patterns[pattern];
+    this.#$('scene').value = pattern;
+    Object.assign(
+        this.#$('ground'),
+        {width: picture.width, height: picture.height, src: await pictureOf(picture)});
+    this.#view.forgetActs();
+    this.#table?.show(pattern, picture);
+  }
+
+  // ---- frames ----
+
+  get #lookWords() { return this.#say(this.patterns.length > 1 ? 'lookMany' : 'look'); }
+
+  #adviceFor({reason, brightness}, unseenMs) {
+    if (brightness < DARK) return this.#say('dark');
+    if (unseenMs < PATIENCE_MS) return this.#$('reason').textContent;
+    if (reason === 'lost by blur') return this.#say('blurred');
+    if (reason === 'out of view') return this.#say('outside');
+    if (reason === 'failed verification') return this.#say('hold');
+    return unseenMs > FAR_MS ? `${this.#lookWords} ${this.#say('far')}` : this.#lookWords;
+  }
+
+  #nameModels(name) { this.#$('models').setAttribute('aria-label', name); }
+
+  /** The texts of a pattern's models and pictures, or of a tapped label. */
+  #fillLabel({language, name, text}) {
+    this.#$('label-name').textContent = name;
+    this.#$('label-text').textContent = text;
+    Object.assign(this.#$('label'), {lang: language, dir: language ? directionOf(language) : ''});
+    this.#fold(this.#folded);
+  }
+
+  /**
+   * Folded, the label is a button that shows it again. asked: by the visitor, so that it stays
+   * unchanged.
+   */
+  #fold(folded, asked = this.#asked) {
+    this.#folded = folded;
+    this.#asked = asked;
+    this.#$('label').hidden = folded;
+    this.#$('label-open').hidden = !folded;
+  }
+
+  #hideLabel() { this.#$('label').hidden = this.#$('label-open').hidden = true; }
+
+  /**
+   * A label that would cover marks moves to the top, or back; where it would there, too, it folds,
+   * unless the visitor asked for it.
+   */
+  #clearMarks() {
+    const label = this.#$('label');
+    if (label.hidden) return;
+    const marks = [...this.#$('marks').children].map((mark) => mark.getBoundingClientRect());
+    const covers = () => {
+      const {left, right, top, bottom} = label.getBoundingClientRect();
+      return marks.some(
+          (mark) =>
+              left < mark.right && mark.left < right && top < mark.bottom && mark.top < bottom);
+    };
+    for (let moves = 0; moves < 2 && covers(); ++moves) this.#$('said').classList.toggle('above');
+    if (!this.#asked && covers()) this.#fold(true);
+  }
+
+  #showLabel(pattern) {
+    this.#noted = false;
+    if (pattern >= 0 && pattern !== this.#labelled) {
+      this.#labelled = pattern;
+      this.#folded = this.#asked = false;
+    }
+    if (pattern < 0) {
+      this.#hideLabel();
+      this.#nameModels(this.#say('nothingSeen'));
+    } else {
+      const label = this.#labelOf(pattern);
+      this.#fillLabel(label);
+      const models =
+          this.#modar.scenes.filter((scene) => scene.pattern === pattern).map(({model}) => model);
+      const heard =
+          this.#view.nodes
+              .map(
+                  (node, i) =>
+                      (node.pattern === pattern && this.#view.captionsOf(i)?.transcript) || '')
+              .filter(Boolean);
+      this.#$('heard').hidden = heard.length === 0;
+      this.#$('heard-text').textContent = heard.join('\n\n');
+      const pictures = this.#view.nodes.map(
+          (node, i) =>
+              (node.pattern === pattern && ['picture', 'video'].includes(node.kind) ?
+                   this.#wordsOf(i).alt :
+                   ''));
+      const seen = [
+        label.alt || this.patterns[pattern].models || models.join(', '), ...pictures
+      ].filter(Boolean).join('; ');
+      this.#nameModels(this.#say('seen', {name: seen, pattern: label.picture}));
+    }
+  }
+
+  #showScene(pattern) {
+    this.#shown = pattern;
+    this.#showLabel(pattern);
+    this.dispatchEvent(new CustomEvent('scenechange', {detail: {pattern}}));
+  }
+
+  // ---- labels that point, and what else a scene does ----
+
+  #wordsOf(node) { return this.#view.wordsOf(node, this.#languages); }
+
+  get #languages() { return [this.#language, this.#language.split('-')[0]]; }
+
+  #useLanguages() { this.#view.languages = this.#languages; }
+
+  /** Sound comes by a visitor's own click or tap only, and what plays can be paused. */
+  #press(id, set) {
+    const on = this.#$(id).getAttribute('aria-pressed') !== 'true';
+    this.#$(id).setAttribute('aria-pressed', String(on));
+    set(on);
+  }
+
+  #listenToScenes(view) {
+    this.#$('media').hidden = !view.nodes.some(({kind}) => kind === 'video' || kind === 'sound');
+    this.#$('captions').hidden = !view.nodes.some((_, node) => view.captionsOf(node));
+    this.#$('pause').setAttribute('aria-pressed', 'false');
+    this.#useLanguages();
+    this.#cues.clear();
+    view.addEventListener('drawn', () => {
+      if (this.#state !== 'start') this.#showMarks();
+    });  // a last frame may come late
+    view.addEventListener('caption', ({detail}) => this.#caption(detail));
+    view.addEventListener('text', ({detail: {node}}) => {
+      const {pattern, name, mark} = view.nodes[node];
+      const {language, title, text} = this.#wordsOf(node);
+      if (!this.#ask('text', {pattern, node: name, language, title, text})) return;
+      this.#fillLabel({language, name: title || mark, text});
+      this.#fold(false, true);
+      this.#$('heard').hidden = true;
+      this.#noted = true;
+    });
+    view.addEventListener('link', ({detail}) => {
+      if (!this.#ask('link', detail)) return;
+      this.#$('leave-address').textContent = this.#$('leave-open').href = detail.address;
+      if (!this.#$('leave').open) this.#$('leave').showModal();
+    });
+  }
+
+  /** Those of what plays at once stand below each other. */
+  #caption({node, text, language}) {
+    this.#cues.delete(node);
+    if (text) this.#cues.set(node, text);
+    const shown = this.#$('captions').getAttribute('aria-pressed') === 'true';
+    Object.assign(this.#$('cue'), {
+      textContent: shown ? [...this.#cues.values()].join('\n') : '',
+      lang: language,
+      dir: 'auto'
+    });
+  }
+
+  /** Its pressed state: a tap on what plays a sound turns it on. */
+  #showSound() {
+    const {sound} = this.#view;
+    if (this.#$('volume').hidden !== sound) return;
+    this.#$('sound').setAttribute('aria-pressed', String(sound));
+    this.#$('volume').hidden = !sound;
+  }
+
+  /** Whether the page leaves it to the viewer. */
+  #ask(type, detail) {
+    return this.dispatchEvent(new CustomEvent(type, {detail, cancelable: true}));
+  }
+
+  /** A button for each label on the screen, in the order of the bundle. */
+  #showMarks() {
+    const marks = this.#$('marks');
+    const buttons =
+        new Map([...marks.children].map((button) => [Number(button.dataset.node), button]));
+    for (const {node, x, y, covered} of this.#view?.labels() ?? []) {
+      const button = buttons.get(node) ?? this.#addMark(node);
+      buttons.delete(node);
+      button.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+      button.toggleAttribute('data-covered', covered);
+    }
+    for (const button of buttons.values()) button.remove();
+    this.#clearMarks();
+    if (this.#view) this.#showSound();
+  }
+
+  #addMark(node) {
+    const {mark} = this.#view.nodes[node];
+    const {title, language} = this.#wordsOf(node);
+    const button =
+        Object.assign(document.createElement('button'), {type: 'button', textContent: mark});
+    button.dataset.node = node;
+    if (title) {
+      Object.assign(button, {title, lang: language});
+      button.setAttribute('aria-label', `${mark}: ${title}`);
+    }
+    button.addEventListener('click', () => this.#view.tapNode(node));
+    const after = [...this.#$('marks').children].find((other) => Number(other.dataset.node) > node);
+    this.#$('marks').insertBefore(button, after ?? null);
+    return button;
+  }
+
+  /** A tapped node acts, and the label is the pattern's again. */
+  #tap(canvas, {clientX, clientY}) {
+    const {left, top} = canvas.getBoundingClientRect();
+    this.#view?.tap(clientX - left, clientY - top);
+    if (this.#noted) this.#showLabel(this.#shown);
+  }
+
+  #onFrame(frame) {
+    if (!this.#camera.stream) return;
+    if (this.#state === 'looking' && frame.reason === 'visible') performance.mark('modar: tracked');
+    try {
+      this.#view.draw(frame, this.#gesture);
+    } catch (error) {
+      this.fail(error);
+      return;
+    }
+    this.#camera.copied(frame.copyMs);
+    if (frame.foundFocal)
+      this.#camera.keepFocal(frame.foundFocal, Math.max(frame.camera.width, frame.camera.height));
+    this.#tellSeen(frame);
+    this.dispatchEvent(new CustomEvent('frame', {detail: frame}));
+  }
+
+  #tellSeen(frame) {
+    const now = performance.now();
+    const first =
+        this.#modar.patterns.findIndex((_, p) => frame.poses[p * POSE_FLOATS + POSE.shown] !== 0);
+    if (first >= 0) {
+      if (this.#state !== 'seen') performance.mark('modar: seen');
+      this.#unseenSince = now;
+      this.#setState('seen');
+      if (first !== this.#shown) this.#showScene(first);
+    } else {
+      this.#setState('looking');
+      setText(this.#$('reason'), this.#adviceFor(frame, now - this.#unseenSince));
+      if (now - this.#unseenSince > PATIENCE_MS && this.#shown >= 0) this.#showScene(-1);
+    }
+  }
+
+  // ---- gestures and keys ----
+
+  /**
+   * What a visitor's hand moves: models before the camera at the next frame, the turntable at
+   * once.
+   */
+  #change(by) {
+    by(this.#table?.gesture ?? this.#gesture);
+    this.#table?.touched();
+  }
+
+  #turn(radians) {
+    this.#change((held) => {
+      held.turn += radians;
+    });
+  }
+
+  #resize(factor) {
+    this.#change((held) => {
+      held.size = Math.min(LARGEST, Math.max(SMALLEST, held.size * factor));
+    });
+  }
+
+  /** Of the turntable alone: before the camera, the visitor walks. */
+  #tilt(radians) {
+    if (this.#table)
+      this.#change((held) => {
+        held.tilt += radians;
+      });
+  }
+
+  #undo() {
+    Object.assign(this.#gesture, {turn: 0, size: 1});
+    this.#table?.reset();
+  }
+
+  #keys = {
+    ArrowLeft: () => this.#turn(-TURN_A_KEY),
+    ArrowRight: () => this.#turn(TURN_A_KEY),
+    ArrowUp: () => this.#resize(SIZE_A_KEY),
+    ArrowDown: () => this.#resize(1 / SIZE_A_KEY),
+    PageUp: () => this.#tilt(TURN_A_KEY),
+    PageDown: () => this.#tilt(-TURN_A_KEY),
+    '+': () => this.#resize(SIZE_A_KEY),
+    '-': () => this.#resize(1 / SIZE_A_KEY),
+    0: () => this.#undo(),
+    Escape: () => this.stop(),
+  };
+
+  #listenToGestures(canvas) {
+    const fingers = new Map();
+    const spread = () => {
+      const [a, b] = [...fingers.values()];
+      return Math.hypot(a.x - b.x, a.y - b.y);
+    };
+    let tap = null;  // where one finger came down that has not moved
+    canvas.addEventListener('pointerdown', (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      fingers.set(event.pointerId, {x: event.clientX, y: event.clientY});
+      tap = fingers.size === 1 ? {x: event.clientX, y: event.clientY} : null;
+    });
+    canvas.addEventListener('pointermove', (event) => {
+      const finger = fingers.get(event.pointerId);
+      if (!finger) return;
+      if (tap && Math.hypot(event.clientX - tap.x, event.clientY - tap.y) > TAP_PIXELS) tap = null;
+      if (tap) return;
+      const before = fingers.size === 2 ? spread() : 0;
+      // Across the whole canvas: one turn.
+      if (fingers.size === 1) {
+        this.#turn(((event.clientX - finger.x) / canvas.clientWidth) * 2 * Math.PI);
+        this.#tilt(((event.clientY - finger.y) / canvas.clientHeight) * Math.PI);
+      }
+      finger.x = event.clientX;
+      finger.y = event.clientY;
+      if (before > 0) this.#resize(spread() / before);
+    });
+    for (const type of ['pointerup', 'pointercancel']) {
+      canvas.addEventListener(type, (event) => {
+        fingers.delete(event.pointerId);
+        if (tap && type === 'pointerup') this.#tap(canvas, event);
+        tap = null;
+      });
+    }
+    canvas.addEventListener('wheel', (event) => {
+      event.preventDefault();
+      this.#resize(Math.exp(-event.deltaY / 500));
+    }, {passive: false});
+  }
+
+  #onKey(event) {
+    if (['button', 'select', 'a', 'input', 'summary'].includes(event.target.localName) &&
+        event.key !== 'Escape')
+      return;
+    if (event.ctrlKey || event.metaKey || event.altKey || !this.#keys[event.key]) return;
+    event.preventDefault();
+    this.#keys[event.key]();
+  }
+
+  #listen() {
+    const keys = this.#keys;
+    const clicks = {
+      start: () => this.start(),
+      look: () => this.look(),
+      close: () => this.stop(),
+      flip: () => this.#flip(),
+      torch: () => this.#toggleTorch(),
+      cameras: () => this.#showCameras(),
+      'choose-close': () => this.#$('choose').close(),
+      copy: () => this.#copyAddress(),
+      'problem-close': () => this.#$('problem').close(),
+      'leave-open': () => this.#$('leave').close(),
+      'leave-close': () => this.#$('leave').close(),
+      sound: () => {
+        this.#view.sound = !this.#view.sound;
+        this.#showSound();
+      },
+      pause: () => this.#press(
+          'pause',
+          (on) => {
+            this.#view.held = on;
+          }),
+      captions: () =>
+          this.#press('captions', () => this.#caption({node: -1, language: this.#$('cue').lang})),
+      'label-close': () => {
+        this.#fold(true, true);
+        this.#$('label-open').focus();
+      },
+      'label-open': () => {
+        this.#fold(false, true);
+        this.#$('label-close').focus();
+      },
+      full: () =>
+          (this.#root.fullscreenElement ? document.exitFullscreen() :
+                                          this.#$('screen').requestFullscreen()),
+      // The same as keys and gestures, for those who do not drag, pinch or type.
+      'turn-left': keys.ArrowLeft,
+      'turn-right': keys.ArrowRight,
+      larger: keys['+'],
+      smaller: keys['-'],
+      higher: keys.PageUp,
+      lower: keys.PageDown,
+      reset: keys[0],
+      again: () => {
+        this.#$('problem').close();
+        this.stop();
+        this.#again();
+      },
+      'look-instead': () => {
+        this.#$('problem').close();
+        this.look();
+      },
+    };
+    for (const [id, action] of Object.entries(clicks))
+      this.#$(id).addEventListener('click', action);
+    this.#$('volume').addEventListener('input', () => {
+      this.#view.volume = this.#$('volume').valueAsNumber;
+    });
+    this.#$('scene').addEventListener('change', () => {
+      const pattern = Number(this.#$('scene').value);
+      this.#showScene(pattern);
+      this.#turnScene(pattern);
+    });
+    this.#$('problem').addEventListener('close', () => {
+      delete this.#$('problem').dataset.kind;
+      if (this.#state === 'error') this.#setState('start');
+    });
+    this.#$('stage').addEventListener('keydown', (event) => this.#onKey(event));
+    // A phone's gesture or button of going back.
+    this.#$('stage').addEventListener('close', () => {
+      if (!this.#$('stage').open && !['start', 'error'].includes(this.#state)) this.stop();
+    });
+    this.#listenToGestures(this.#$('models'));
+  }
+}
+
+if (globalThis.customElements && !customElements.get('modar-viewer'))
+  customElements.define('modar-viewer', ModarViewer);

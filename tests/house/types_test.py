@@ -1,0 +1,56 @@
+"""The pages' JavaScript against its types: strict, by Debian's TypeScript, in each module that begins with // @ts-check."""
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
+TSC = shutil.which("tsc")
+FOLDERS = (ROOT / "runtime/extensions/web", ROOT / "bake/extensions/studio/page")
+# Not yet checked: their parameters have no types. Modules leave this list, and none joins it.
+UNCHECKED = {
+    "runtime/extensions/web": {"app.js", "engine.js", "modar-view.js", "modar-viewer.js", "modar-worker.js", "modar.js", "own-picture.js",
+                    "sw.js", "update-worker.js"},
+    "bake/extensions/studio/page": {"app.js", "corners.js", "files.js", "parts.js", "picture.js", "placing.js", "rail.js", "scene.js", "ship.js",
+                         "stage.js", "state.js", "surface.js", "thumbs.js", "try.js"}}
+# These import what emscripten builds.
+GENERATED = {"modar-worker-plain.js", "modar-worker-simd.js", "record-worker-plain.js", "record-worker-simd.js"}
+OPTIONS = {"strict": True, "allowJs": True, "noEmit": True, "target": "es2022", "module": "esnext", "moduleResolution": "node",
+           "lib": ["es2022", "dom", "dom.iterable"], "types": []}
+
+
+WRONG = {"TS2339": "/** @param {number} a */\nexport const f = (a) => a.length;\n", "TS7006": "export const f = (a) => a;\n",
+         "TS2531": "export const f = document.body.querySelector('a').href;\n"}
+
+
+def modules():
+    return [file for folder in FOLDERS for file in sorted(folder.glob("*.js"))]
+
+
+class Types(unittest.TestCase):
+    def test_each_module_is_checked_or_listed(self):
+        for folder in FOLDERS:
+            unchecked = {file.name for file in folder.glob("*.js") if not file.read_text().startswith("// @ts-check\n")}
+            self.assertEqual(unchecked - GENERATED, UNCHECKED[str(folder.relative_to(ROOT))], folder)
+
+    @unittest.skipUnless(TSC, "node-typescript is not installed")
+    def test_they_hold_and_planted_faults_are_found(self):
+        with tempfile.TemporaryDirectory(prefix="modar-types-") as folder:
+            project, newer = pathlib.Path(folder) / "tsconfig.json", pathlib.Path(folder) / "newer.d.ts"
+            newer.write_text("interface VideoFrame { close(): void }\n")  # TypeScript 4.8 does not know it
+            for code, text in WRONG.items():
+                (pathlib.Path(folder) / f"{code}.js").write_text("// @ts-check\n" + text)
+            files = [newer, *pathlib.Path(folder).glob("*.js"), *(file for file in modules() if file.name not in GENERATED)]
+            project.write_text(json.dumps({"compilerOptions": OPTIONS, "files": [str(file) for file in files]}))
+            told = subprocess.run([TSC, "-p", project], cwd=ROOT, capture_output=True, text=True).stdout.splitlines()
+        planted = [line for line in told if any(f"{code}.js" in line for code in WRONG)]
+        self.assertEqual(sorted(re.search(r"error (TS\d+)", line)[1] for line in planted), sorted(WRONG), told)
+        self.assertEqual([line for line in told if line not in planted], [])
+
+
+if __name__ == "__main__":
+    unittest.main()
