@@ -18,7 +18,7 @@
 namespace modar {
 namespace {
 
-/// Rms of 255 by which texels may differ from half of the level before. Lower: good ETC1 blocks
+/// Rms by which texels may differ from half of the level before. Lower: good ETC1 blocks
 /// refused; higher: faults accepted. [20, 60]
 constexpr double kMipSlack = 40;
 /// Shortest side of a level that is compared. Lower: levels of few blocks, where one texel is much
