@@ -1,5 +1,26 @@
+// @ts-check
 // The engine (engine.cpp) as an object: WebAssembly with vectors of 128 bits where the browser has
 // them, without elsewhere.
+
+/**
+ * What emscripten makes of engine.cpp.
+ * @typedef {Record<`_web_${string}`, (...numbers: number[]) => number> & {
+ *   HEAPU8: Uint8Array,
+ *   UTF8ToString: (address: number) => string,
+ *   GL: {
+ *     textures: WebGLTexture[],
+ *     registerContext: (context: WebGLRenderingContext, attributes: object) => number,
+ *     makeContextCurrent: (handle: number) => void,
+ *   },
+ * }} Module
+ *
+ * @typedef {import('./modar.js').Modar['kind']} Kind of build
+ * @typedef {{code: string, where?: string, cause: string, cure?: string}} Plain error
+ * @typedef {{name: string, widthMm?: number}} Pattern
+ * @typedef {import('./modar-view.js').SceneNode & {loops: boolean}} Node
+ * @typedef {{node: number, material?: number, ended?: boolean}} Happened
+ * @typedef {{play: number} | {pause: number} | {text: number} | {link: string}} Todo
+ */
 
 /** A module of one function that answers a v128: browsers without SIMD refuse it. */
 const NEEDS_SIMD = Uint8Array.of(
@@ -30,7 +51,11 @@ export const POSE = {
  */
 const TRACKED_SIDE = 640;
 
-/** By how much the sides of a frame are divided before it is tracked. */
+/**
+ * By how much the sides of a frame are divided before it is tracked.
+ * @param {number} width
+ * @param {number} height
+ */
 export const shrinkOf = (width, height) =>
     Math.max(1, Math.floor(Math.max(width, height) / TRACKED_SIDE));
 
@@ -39,6 +64,7 @@ export const shrinkOf = (width, height) =>
  * themselves, browsers let some 64 MB of such pile up. Messages to a port are freed when the
  * port is closed; of a closed one Chromium takes nothing, and transfer() frees nothing that came
  * from a network.
+ * @param {Uint8Array[]} arrays
  */
 export function release(...arrays) {
   const {port1, port2} = new MessageChannel();
@@ -49,6 +75,7 @@ export function release(...arrays) {
 
 /** What went wrong: `code` is stable, `cure` says what to do. */
 export class ModarError extends Error {
+  /** @param {Plain} error */
   constructor({code, where = '', cause, cure = ''}) {
     super(`${where ? `${where}: ` : ''}${cause}${cure ? `; ${cure}` : ''} [${code}]`);
     this.name = 'ModarError';
@@ -79,6 +106,7 @@ const STRANDED = new URL('./engine-simd.wasm', import.meta.url).pathname.include
 /**
  * Where that server has a file of this package; null in any other place, where bundlers see the
  * addresses that modules name.
+ * @param {string} name
  */
 export function strandedFile(name) {
   return STRANDED ? import.meta.url.replace(/\/\.vite\/deps\/.*$/, `/modar/${name}`) : null;
@@ -87,7 +115,11 @@ export function strandedFile(name) {
 /** Seconds in which the engine has to be loaded. */
 export const ENGINE_S = 60;
 
-/** Throws what kept an engine from being loaded. */
+/**
+ * Throws what kept an engine from being loaded.
+ * @param {{message?: string}} error
+ * @returns {never}
+ */
 export function engineFailed({message = ''}) {
   const cause = `the engine did not load: ${message}`;
   if (/unsafe-eval|content.security/i.test(message)) {
@@ -106,7 +138,21 @@ export class Engine {
   #module;
   /** Its place in the heap. */
   #bundle = {at: 0, size: 0};
+  /** @type {Pattern[]} */
+  patterns = [];
+  /** @type {string[]} */
+  languages = [];
+  /** @type {Node[]} */
+  nodes = [];
+  /** @type {import('./modar.js').Scene[]} */
+  scenes = [];
+  width = 0;
+  height = 0;
 
+  /**
+   * @param {Module} module
+   * @param {Kind} kind
+   */
   constructor(module, kind) {
     this.#module = module;
     this.kind = kind;
@@ -114,23 +160,36 @@ export class Engine {
     this.frameBytes = 0;
   }
 
-  /** load: what a build's JavaScript exports. */
+  /**
+   * load: what a build's JavaScript exports.
+   * @param {(options: object) => Promise<unknown>} load
+   * @param {Kind} kind
+   */
   static async of(load, kind) {
     return new Engine(
-        await load(STRANDED ? {locateFile: strandedFile} : {}).catch(engineFailed), kind);
+        /** @type {Module} */ (
+            await load(STRANDED ? {locateFile: strandedFile} : {}).catch(engineFailed)),
+        kind);
   }
 
   /** For lod-stream.js: what most pages do not load. */
   get module() { return this.#module; }
 
+  /** @param {number} status */
   check(status) {
     if (status === 0) return;
-    const text = (field) => this.#module.UTF8ToString(this.#module._web_error(field));
+    const text = (/** @type {number} */ field) =>
+        this.#module.UTF8ToString(this.#module._web_error(field));
     throw new ModarError({code: text(0), where: text(1), cause: text(2), cure: text(3)});
   }
 
+  /** @param {number} bytes */
   #reserve(bytes) { return this.#module._web_reserve(bytes) || this.#missing(bytes); }
 
+  /**
+   * @param {number} bytes
+   * @returns {never}
+   */
   #missing(bytes) {
     throw new ModarError({
       code: 'web.memory',
@@ -142,6 +201,8 @@ export class Engine {
   /**
    * Makes room for a bundle of that many bytes, where unwritten pages take no memory, and opens
    * it with the parts written first. The coarsest levels come by put(), the rest by pass().
+   * @param {number} size
+   * @param {import('./arrival.js').Part[]} pieces
    */
   arrive(size, pieces) {
     this.#bundle = {at: this.#module._web_arrive(size) || this.#missing(size), size};
@@ -149,17 +210,24 @@ export class Engine {
     this.#open();
   }
 
+  /**
+   * @param {number} offset
+   * @param {Uint8Array} bytes
+   */
   put(offset, bytes) { this.#module.HEAPU8.set(bytes, this.#bundle.at + offset); }
 
   /**
    * Before pass(), in the context that is current. inOrder: bytes come as in a file; else what
    * showCoarse() shows is there.
+   * @param {boolean} inOrder
    */
   beginRest(inOrder) { this.check(this.#module._web_begin_rest(inOrder ? 1 : 0)); }
 
   /**
    * Takes bytes that are drawn from to the GPU, and keeps what the engine itself reads; then they
    * are gone.
+   * @param {number} offset
+   * @param {Uint8Array} bytes
    */
   pass(offset, bytes) {
     const {length} = bytes;
@@ -171,10 +239,14 @@ export class Engine {
   /**
    * Draws the coarsest of everything from now on. fixedLight: the models' light does not follow
    * look().
+   * @param {boolean} fixedLight
    */
   showCoarse(fixedLight) { this.check(this.#module._web_show_coarse(fixedLight ? 1 : 0)); }
 
-  /** Draws what pass() took from now on, which is verified. */
+  /**
+   * Draws what pass() took from now on, which is verified.
+   * @param {boolean} fixedLight
+   */
   showAll(fixedLight) { this.check(this.#module._web_show_all(fixedLight ? 1 : 0)); }
 
   /** The bundle, a view until the heap grows: what pass() took is missing in part. */
@@ -182,20 +254,34 @@ export class Engine {
     return this.#module.HEAPU8.subarray(this.#bundle.at, this.#bundle.at + this.#bundle.size);
   }
 
-  /** Takes the recipe of a packed bundle, for decode(). */
+  /**
+   * Takes the recipe of a packed bundle, for decode().
+   * @param {Uint8Array} bytes
+   */
   recipe(bytes) {
     const at = this.#reserve(bytes.length);
     this.#module.HEAPU8.set(bytes, at);
     this.check(this.#module._web_recipe(at, bytes.length));
   }
 
-  /** Some of a tracker record's `stored` bytes have come: decode() has less to do. */
+  /**
+   * Some of a tracker record's `stored` bytes have come: decode() has less to do.
+   * @param {number} index
+   * @param {number} stored
+   * @param {number} at
+   * @param {Uint8Array} bytes
+   */
   begin(index, stored, at, bytes) {
     this.frameBuffer(stored).set(bytes, at);
     this.#module._web_begin_piece(index, this.frameAt, at + bytes.length);
   }
 
-  /** The raw bytes of a piece, verified. */
+  /**
+   * The raw bytes of a piece, verified.
+   * @param {number} index
+   * @param {Uint8Array} stored
+   * @param {number} size
+   */
   decode(index, stored, size) {
     this.frameBuffer(stored.length).set(stored);
     const at = this.#module._web_piece(index, this.frameAt);
@@ -211,7 +297,6 @@ export class Engine {
                                                        name: m.UTF8ToString(m._web_pattern_name(i)),
                                                        widthMm: m._web_pattern_width_mm(i),
                                                      }));
-    this.languages = [];
     for (let i = 0, at; (at = m._web_language(i)) !== 0; ++i)
       this.languages.push(m.UTF8ToString(at));
     this.nodes = Array.from(
@@ -219,7 +304,8 @@ export class Engine {
         (_, i) => ({
           name: this.#nodeText(i, 3),
           pattern: m._web_node(i, 0),
-          kind: ['model', 'picture', 'label', 'video', 'sound'][m._web_node(i, 1) - 1] ?? '',
+          kind: /** @type {Node['kind']} */ (
+              ['model', 'picture', 'label', 'video', 'sound'][m._web_node(i, 1) - 1] ?? ''),
           mark: this.#nodeText(i, 4),
           loops: m._web_node(i, 2) !== 0,
         }));
@@ -231,25 +317,40 @@ export class Engine {
         }));
   }
 
-  /** Where the engine reads a short text. */
+  /**
+   * Where the engine reads a short text.
+   * @param {string} text
+   */
   #given(text) {
     const bytes = new TextEncoder().encode(`${text}\0`);
     this.frameBuffer(bytes.length).set(bytes);
     return this.frameAt;
   }
 
-  /** kind: 0 text, 1 description, 2 title, 3 name, 4 mark. */
+  /**
+   * kind: 0 text, 1 description, 2 title, 3 name, 4 mark.
+   * @param {number} node
+   * @param {number} kind
+   */
   #nodeText(node, kind, language = '') {
     return this.#module.UTF8ToString(
         this.#module._web_node_text(node, kind, this.#given(language)));
   }
 
-  /** A WebVTT file of the captions of a video or sound; '' where it has none in that language. */
+  /**
+   * A WebVTT file of the captions of a video or sound; '' where it has none in that language.
+   * @param {number} node
+   * @param {string} language
+   */
   captionsOf(node, language) {
     return this.#module.UTF8ToString(this.#module._web_captions(node, this.#given(language)));
   }
 
-  /** The words of a node: {title, text, alt}, '' where it has none in that language. */
+  /**
+   * The words of a node: {title, text, alt}, '' where it has none in that language.
+   * @param {number} node
+   * @param {string} language
+   */
   wordsOf(node, language) {
     const [text, alt, title] = [0, 1, 2].map((kind) => this.#nodeText(node, kind, language));
     return {title, text, alt};
@@ -258,8 +359,9 @@ export class Engine {
   /**
    * A step of the bundle's actions. time: seconds. event: {node, material} that was tapped, {node,
    * ended: true} of a video or sound, or nothing.
-   * @returns what the page has to do: {play:
-   * node}, {pause: node}, {text: node} or {link: address}
+   * @param {number} time
+   * @param {Happened | null} event
+   * @returns {Todo[]} what the page has to do
    */
   act(time, event) {
     const m = this.#module;
@@ -268,17 +370,24 @@ export class Engine {
     return Array.from({length: count}, (_, i) => {
       const [kind, node, action] = [0, 1, 2].map((field) => m._web_command(i, field));
       if (kind === 7) return {link: m.UTF8ToString(m._web_address(action))};
-      return {[{1: 'play', 2: 'pause', 6: 'text'}[kind]]: node};
+      const todo = /** @type {Record<number, string>} */ ({1: 'play', 2: 'pause', 6: 'text'})[kind];
+      return /** @type {Todo} */ ({[todo]: node});
     });
   }
 
-  /** The file of a video or sound. */
+  /**
+   * The file of a video or sound.
+   * @param {number} node
+   */
   mediaOf(node) {
     const at = this.#module._web_media(node);
     return this.#module.HEAPU8.slice(at, at + this.#module._web_media_size(node));
   }
 
-  /** A new texture that a video node shows from now on, as WebGL knows it. */
+  /**
+   * A new texture that a video node shows from now on, as WebGL knows it.
+   * @param {number} node
+   */
   videoTexture(node) { return this.#module.GL.textures[this.#module._web_video_texture(node)]; }
 
   /** Something turns, or a delay runs: act() and draw() again, though no frame comes. */
@@ -286,7 +395,14 @@ export class Engine {
 
   forgetActs() { this.#module._web_forget_acts(); }
 
-  /** The node under a pixel of the canvas: {node, material}, or null. */
+  /**
+   * The node under a pixel of the canvas: {node, material}, or null.
+   * @param {number} width
+   * @param {number} height
+   * @param {boolean} mirror
+   * @param {number} x
+   * @param {number} y
+   */
   pick(width, height, mirror, x, y) {
     const at = this.#module._web_pick(width, height, mirror ? 1 : 0, x, y);
     if (at === 0) return null;
@@ -297,6 +413,11 @@ export class Engine {
   /**
    * Where a label is on the canvas, pixels: {x, y, covered}, or null. look: whether something may
    * cover it.
+   * @param {number} node
+   * @param {number} width
+   * @param {number} height
+   * @param {boolean} mirror
+   * @param {boolean} look
    */
   label(node, width, height, mirror, look) {
     const at = this.#module._web_label(node, width, height, mirror ? 1 : 0, look ? 1 : 0);
@@ -305,7 +426,10 @@ export class Engine {
     return {x, y, covered: covered !== 0};
   }
 
-  /** The box of a pattern's content, in its space: {low, high}, or null where nothing does. */
+  /**
+   * The box of a pattern's content, in its space: {low, high}, or null where nothing does.
+   * @param {number} pattern
+   */
   bounds(pattern) {
     const address = this.#module._web_bounds(pattern);
     if (address === 0) return null;
@@ -313,7 +437,12 @@ export class Engine {
     return {low: [...numbers.subarray(0, 3)], high: [...numbers.subarray(3)]};
   }
 
-  /** Of the camera's frames. focal: in pixels, 0: unknown (the longer side, to begin with). */
+  /**
+   * Of the camera's frames. focal: in pixels, 0: unknown (the longer side, to begin with).
+   * @param {number} width
+   * @param {number} height
+   * @param {number} focal
+   */
   setCamera(width, height, focal) {
     this.width = width;
     this.height = height;
@@ -325,17 +454,26 @@ export class Engine {
   /** Its standard deviation, pixels; 0 where it is not estimated. */
   get focalSigma() { return this.#module._web_focal_sigma(); }
 
-  /** Starts tracking anew for the camera. */
+  /**
+   * Starts tracking anew for the camera.
+   * @param {boolean} findFocal
+   */
   track(findFocal, budget = 0, extended = false) {
     this.check(this.#module._web_track(findFocal ? 1 : 0, budget, extended ? 1 : 0));
   }
 
   reset() { this.#module._web_reset(); }
 
-  /** How the camera turned up to the next frame: three numbers, see modar.d.ts. */
+  /**
+   * How the camera turned up to the next frame: three numbers, see modar.d.ts.
+   * @param {[number, number, number]} turn
+   */
   turn([x, y, z]) { this.#module._web_turn(x, y, z); }
 
-  /** Room for a frame in the heap, the same until a larger one is requested. */
+  /**
+   * Room for a frame in the heap, the same until a larger one is requested.
+   * @param {number} bytes
+   */
   frameBuffer(bytes) {
     if (bytes > this.frameBytes) {
       if (this.frameAt !== 0) this.#module._web_free(this.frameAt);
@@ -351,6 +489,7 @@ export class Engine {
   /**
    * Takes a record as a further pattern.
    * @param {Uint8Array} record
+   * @param {Pattern} pattern
    */
   addPattern(record, pattern) {
     this.frameBuffer(record.length).set(record);
@@ -361,6 +500,8 @@ export class Engine {
   /**
    * A further pattern, as another engine's addPattern() has it, gets the content of a scene.
    * @returns false: there are too many
+   * @param {Pattern} pattern
+   * @param {number} scene
    */
   stand(pattern, scene) {
     if (!this.#module._web_stand(scene)) return false;
@@ -380,26 +521,37 @@ export class Engine {
   /**
    * The frame buffer's gray picture, `shrink` times the camera's size, becomes that size, in
    * place; its stride is the width.
+   * @param {number} stride
+   * @param {number} shrink
    */
   shrink(stride, shrink) {
     this.#module._web_shrink(this.frameAt, stride, this.width, this.height, shrink);
   }
 
-  /** The frame buffer's luma of video (16 to 235) becomes 0 to 255. */
+  /**
+   * The frame buffer's luma of video (16 to 235) becomes 0 to 255.
+   * @param {number} stride
+   */
   widenLuma(stride) { this.#module._web_widen_luma(this.frameAt, stride * this.height); }
 
   /**
    * Tracks the gray frame in the frame buffer.
    * @returns poses, a view that the next call changes.
+   * @param {number} stride
+   * @param {number} time
    */
   step(stride, time) {
     this.check(this.#module._web_step(this.frameAt, stride, time));
     return this.poses();
   }
 
+  /** @param {number} stride */
   brightness(stride) { return this.#module._web_brightness(this.frameAt, stride); }
 
-  get reason() { return this.#module.UTF8ToString(this.#module._web_reason()); }
+  get reason() {
+    return /** @type {import('./modar.js').Reason} */ (
+        this.#module.UTF8ToString(this.#module._web_reason()));
+  }
 
   poses() {
     return new Float32Array(
@@ -411,6 +563,7 @@ export class Engine {
   /**
    * Makes a WebGL context current.
    * @param {1 | 2} version
+   * @param {WebGLRenderingContext | WebGL2RenderingContext} context
    */
   useContext(context, version) {
     const {GL} = this.#module;
@@ -427,6 +580,11 @@ export class Engine {
     this.#module._web_look(this.frameAt, width, height);
   }
 
+  /**
+   * @param {number} width
+   * @param {number} height
+   * @param {import('./modar-view.js').Gesture} gesture
+   */
   draw(width, height, {mirror = false, turn = 0, size = 1} = {}) {
     this.#module._web_draw(width, height, mirror ? 1 : 0, turn, size);
   }

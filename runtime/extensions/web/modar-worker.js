@@ -1,14 +1,52 @@
+// @ts-check
 // What a worker does: one engine that tracks. modar.js sends it one frame at a time.
 import {Engine, ModarError, release} from './engine.js';
 
 /** Share of the focal length below which its spread makes it worth keeping for the next start. */
 const KNOWN_FOCAL = 0.03;
 
+/**
+ * Of start(): focal: pixels, where a frame's longer side has `side` of them.
+ * @typedef {{focal: number, side: number, findFocal: boolean, budget: number, extended: boolean}}
+ * Options
+ * @typedef {{frame?: undefined, width: number, height: number, pixels: ArrayBuffer, kind: 'gray' |
+ *     'rgba'}} Pixels
+ * @typedef {{time: number, turn?: [number, number, number], keepLuma?: boolean} & (Pixels | {frame:
+ *     VideoFrame, shrink: number})} FrameQuestion
+ * @typedef {import('./modar.js').Frame} Frame
+ *
+ * The answer to it.
+ * @typedef {Omit<Frame, 'source' | 'camera' | 'time'> & import('./modar.js').Camera &
+ *     {type: 'poses'}} Tracked
+ *
+ * The questions to this worker.
+ * @typedef {{
+ *   prepare: object,
+ *   open: {size: number, found: import('./arrival.js').Part[]},
+ *   recipe: {bytes: Uint8Array},
+ *   begin: {index: number, stored: number, at: number, bytes: Uint8Array},
+ *   piece: {index: number, stored: Uint8Array, size: number},
+ *   camera: Options,
+ *   add: {record: Uint8Array, pattern: import('./engine.js').Pattern},
+ *   forget: {kept: number},
+ *   frame: FrameQuestion,
+ * }} Questions
+ *
+ * @typedef {{type: string, bytes?: Uint8Array}} Answer
+ */
+
+/** @type {Promise<Engine>} */
 let loading;
+/** @type {Engine} */
 let engine;
+/** @type {Options} */
 let camera = {focal: 0, side: 0, findFocal: true, budget: 0, extended: false};
 let told = false;
 
+/**
+ * @param {number} width
+ * @param {number} height
+ */
 function useSize(width, height) {
   if (engine.width === width && engine.height === height) return;
   // A phone that was turned has another camera: the measurement for its other size applies, scaled
@@ -21,6 +59,8 @@ function useSize(width, height) {
 /**
  * The frame's luma into the engine's buffer, its sides divided by `shrink`; its stride, or 0 where
  * it cannot be read so.
+ * @param {VideoFrame} frame
+ * @param {number} shrink
  */
 async function takeVideoFrame(frame, shrink) {
   const planar = frame.format === 'I420' || frame.format === 'NV12';
@@ -38,6 +78,7 @@ async function takeVideoFrame(frame, shrink) {
   return stride;
 }
 
+/** @param {Pixels} message */
 function takePixels({width, height, pixels, kind}) {
   engine.frameBuffer(pixels.byteLength).set(new Uint8Array(pixels));
   useSize(width, height);
@@ -45,6 +86,7 @@ function takePixels({width, height, pixels, kind}) {
   return width;
 }
 
+/** @param {FrameQuestion} message */
 async function track(message) {
   const began = performance.now();
   let stride = 0;
@@ -54,14 +96,14 @@ async function track(message) {
   } else {
     stride = takePixels(message);
   }
-  if (stride === 0) return {type: 'unreadable', id: message.id};
+  if (stride === 0) return {type: 'unreadable'};
   const copied = performance.now();
   if (message.turn) engine.turn(message.turn);
   const poses = engine.step(stride, message.time).slice();
   const stepped = performance.now();
+  /** @type {Tracked} */
   const answer = {
     type: 'poses',
-    id: message.id,
     width: engine.width,
     height: engine.height,
     focal: engine.focal,
@@ -81,6 +123,7 @@ async function track(message) {
   return answer;
 }
 
+/** @param {number} stride */
 function lumaOf(stride) {
   const {width, height} = engine;
   const from = engine.frameBuffer(stride * height);
@@ -90,6 +133,7 @@ function lumaOf(stride) {
   return luma;
 }
 
+/** @type {{[K in keyof Questions]: (question: Questions[K]) => Answer | Promise<Answer>}} */
 const answers = {
   async prepare() {
     engine = await loading;
@@ -133,20 +177,26 @@ const answers = {
   frame: track,
 };
 
+/** @param {MessageEvent} event */
 async function answer({data}) {
   try {
-    const told = await answers[data.type](data);
-    self.postMessage({...told, call: data.call}, told.bytes ? [told.bytes.buffer] : []);
+    const told = await answers[/** @type {keyof Questions} */ (data.type)](data);
+    /** @type {Worker} */ (/** @type {unknown} */ (self))
+        .postMessage({...told, call: data.call}, told.bytes ? [told.bytes.buffer] : []);
   } catch (error) {
     data.frame?.close();
     const told = error instanceof ModarError ?
         error.plain() :
-        {code: 'web.worker', cause: String(error.message ?? error)};
+        {code: 'web.worker', cause: String(/** @type {Error} */ (error).message ?? error)};
     self.postMessage({type: 'failed', call: data.call, error: told});
   }
 }
 
-/** Starts this worker with one of the builds of the engine. @see Engine.of */
+/**
+ * Starts this worker with one of the builds of the engine. @see Engine.of
+ * @param {(options: object) => Promise<unknown>} load
+ * @param {import('./engine.js').Kind} kind
+ */
 export function serve(load, kind) {
   loading = Engine.of(load, kind);
   loading.catch(() => {});  // answered to the first message

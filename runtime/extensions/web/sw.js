@@ -1,3 +1,4 @@
+// @ts-check
 // Keeps the page for visits without a network. `modar web` writes a line before this one: SITE,
 // with the folder's files, how many bytes each has (0: a host may change it), and a hash of them
 // all. A new hash is a new site: it is fetched whole, and takes the place of the old one when all
@@ -16,9 +17,12 @@ const SIMD = WebAssembly.validate(Uint8Array.of(
     0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 8, 1, 6, 0, 65, 0, 253, 15,
     11));
 
-/** The downloads of an address, if complete: in parts, whose sum was written last. */
+/**
+ * The downloads of an address, if complete: in parts, whose sum was written last.
+ * @param {Request} request
+ */
 async function downloadOf({url}) {
-  const match = (address) => caches.match(address, {cacheName: DOWNLOADS});
+  const match = (/** @type {string} */ address) => caches.match(address, {cacheName: DOWNLOADS});
   const size = Number(await (await match(`${url}&sum`))?.text());
   const parts = [];
   let at = 0;
@@ -31,7 +35,12 @@ async function downloadOf({url}) {
   return at > 0 && at === size ? new Response(new Blob(parts)) : undefined;
 }
 
-/** A file of the site: whole, and not the page of a network that wants a login. */
+/**
+ * A file of the site: whole, and not the page of a network that wants a login.
+ * @param {string} file
+ * @param {number} bytes
+ * @param {RequestCache} cache
+ */
 async function fetched(file, bytes, cache) {
   const abort = new AbortController();
   const late = setTimeout(() => abort.abort(), MOST_MS + bytes / LEAST_BYTES_A_MS);
@@ -45,7 +54,10 @@ async function fetched(file, bytes, cache) {
   throw new Error(`${file} came as something else`);
 }
 
-/** Serves the page or, where that is kept, its bundles: each as far as it comes. */
+/**
+ * Serves the page or, where that is kept, its bundles: each as far as it comes.
+ * @param {boolean} bundles
+ */
 async function keep(bundles) {
   const other = SIMD ? 'plain.' : 'simd.';
   const files = Object.keys(SITE.files)
@@ -66,7 +78,7 @@ async function keep(bundles) {
             await fetched(file, SITE.files[file] ?? 0, first)
                 .catch(() => fetched(file, SITE.files[file] ?? 0, 'reload')));
   }));
-  for (const {reason} of kept)
+  for (const {reason} of /** @type {PromiseRejectedResult[]} */ (kept))
     if (reason) throw reason;
 }
 
@@ -79,9 +91,9 @@ self.addEventListener(
 // The visit's downloads are there. A visitor may have deleted stored files, and come back.
 self.addEventListener(
     'message',
-    (event) => event.waitUntil(
+    (event) => /** @type {MessageEvent & ExtendableEvent} */ (event).waitUntil(
         caches.has(CACHE)
-            .then((kept) => kept || keep(false))
+            .then((kept) => kept || /** @type {Promise<unknown>} */ (keep(false)))
             .catch((error) => caches.delete(CACHE).then(() => Promise.reject(error)))
             .then(() => keep(true))
             .then(() => caches.delete(DOWNLOADS))
@@ -97,7 +109,11 @@ self.addEventListener('activate', (event) => {
                                  .map((name) => caches.delete(name)))));
 });
 
-/** The requested part of a stored file. */
+/**
+ * The requested part of a stored file.
+ * @param {Response} kept
+ * @param {string} range
+ */
 async function part(kept, range) {
   const [, from, last] = /^bytes=(\d+)-(\d*)$/.exec(range) ?? [];
   if (!from) return kept;
@@ -106,7 +122,7 @@ async function part(kept, range) {
   if (body.size === 0) return new Response(null, {status: 416});
   const place = `bytes ${from}-${Number(from) + body.size - 1}/${whole.size}`;
   return new Response(
-      body, {status: 206, headers: {'Content-Range': place, 'Content-Length': body.size}});
+      body, {status: 206, headers: {'Content-Range': place, 'Content-Length': `${body.size}`}});
 }
 
 self.addEventListener('fetch', (event) => {

@@ -1,3 +1,4 @@
+// @ts-check
 // Updates the bundles of the page from a release folder of `modar ship`, in parallel with the
 // page: all is checked before it is used, and the release in use stays until the new is whole and
 // stored.
@@ -16,13 +17,53 @@ const PORTION_BYTES = 16 << 20;
 /** Requests of a file in a visit, and bytes a second that are too few: as modar-fetch asks for. */
 const MOST_ASKED = 3, LEAST_RATE = 64;
 
+/**
+ * Of emscripten.
+ * @typedef {{
+ *   readdir: (path: string) => string[],
+ *   lstat: (path: string) => {mode: number},
+ *   stat: (path: string) => {size: number},
+ *   isDir: (mode: number) => boolean,
+ *   isFile: (mode: number) => boolean,
+ *   isLink: (mode: number) => boolean,
+ *   readlink: (path: string) => string,
+ *   readFile: ((path: string) => Uint8Array) &
+ *       ((path: string, options: {encoding: 'utf8'}) => string),
+ *   writeFile: (path: string, data: string | Uint8Array) => void,
+ *   mkdirTree: (path: string) => void,
+ *   unlink: (path: string) => void,
+ *   analyzePath: (path: string) => {exists: boolean},
+ * }} Files
+ *
+ * The installer: what emscripten makes of update.cpp.
+ * @typedef {Record<`_update_${string}`, (...numbers: number[]) => number> & {
+ *   FS: Files,
+ *   HEAPU8: Uint8Array,
+ *   UTF8ToString: (address: number) => string,
+ *   ccall: (name: string, answer: 'number', types: string[], values: (string | number)[]) =>
+ *       number,
+ * }} Installer
+ *
+ * A release folder, its key, and the release that came with the page.
+ * @typedef {{url: string, stall: number, key: string, epoch: number, version: number, hashes:
+ *     string[]}} Site
+ *
+ * @typedef {{status: number, bytes: Uint8Array, whole: boolean}} Got
+ */
+
 /** The files of a release that a visit has downloaded, each requested a few times at most. */
-class Brought {
+class Downloads {
   #url;
   #stall;
-  #files = new Map();  // by path: {from, status, bytes, whole}
+  /** @type {Map<string, Got & {from: number}>} by path */
+  #files = new Map();
+  /** @type {Map<string, number>} */
   #asked = new Map();
 
+  /**
+   * @param {string} url
+   * @param {number} stall
+   */
   constructor(url, stall) {
     this.#url = url;
     this.#stall = stall;
@@ -31,21 +72,33 @@ class Brought {
   /**
    * {status, bytes, whole}: what came of a file, at most one byte more than `limit`, of the whole
    * file, allows. status: of HTTP, 0 where it broke.
+   * @param {string} path
+   * @param {number} from
+   * @param {number} limit
+   * @param {RequestCache} cache
+   * @returns {Promise<Got>}
    */
   async #download(path, from, limit, cache) {
     const source = new Source(
         this.#url + path, {from, cache, tries: 1, stall: this.#stall, rate: LEAST_RATE, any: true});
+    /** @type {Uint8Array[]} */
     const parts = [];
     try {
       const bytes =
           await source.take(limit - from + 1, false, (_, part) => parts.push(part.slice()));
       return {status: 200, bytes, whole: true};
-    } catch ({status = 0}) { return {status, bytes: joined(parts), whole: status > 0}; } finally {
-      source.close();
-    }
+    } catch (error) {
+      const {status = 0} = /** @type {{status?: number}} */ (error);
+      return {status, bytes: joined(parts), whole: status > 0};
+    } finally { source.close(); }
   }
 
-  /** False if it was requested too often: then it is as one that did not come. */
+  /**
+   * False if it was requested too often: then it is as one that did not come.
+   * @param {string} path
+   * @param {number} from
+   * @param {number} limit
+   */
   async bring(path, from, limit) {
     const asked = (this.#asked.get(path) ?? 0) + 1;
     this.#asked.set(path, asked);
@@ -62,16 +115,23 @@ class Brought {
    * What came of a file from that byte on; undefined: nothing yet. A piece, and what broke, is
    * handed out once, so that it is requested again; but a file that was requested too often
    * stays missing.
+   * @param {string} path
+   * @param {number} from
    */
   take(path, from) {
     const file = this.#files.get(path);
-    if (!file || (file.from !== from && this.#asked.get(path) <= MOST_ASKED)) return undefined;
-    if ((path.startsWith('objects/') || !file.whole) && this.#asked.get(path) <= MOST_ASKED)
+    const asked = /** @type {number} */ (this.#asked.get(path));
+    if (!file || (file.from !== from && asked <= MOST_ASKED)) return undefined;
+    if ((path.startsWith('objects/') || !file.whole) && asked <= MOST_ASKED)
       this.#files.delete(path);
     return file;
   }
 
-  /** A document of the release as text; undefined where the server does not give it. */
+  /**
+   * A document of the release as text; undefined where the server does not give it.
+   * @param {string} path
+   * @param {number} limit
+   */
   async text(path, limit) {
     if (!this.#files.has(path)) await this.bring(path, 0, limit);
     const file = this.#files.get(path);
@@ -81,6 +141,11 @@ class Brought {
   }
 }
 
+/**
+ * @param {Files} FS
+ * @param {string} folder
+ * @returns {string[]}
+ */
 function pathsBelow(FS, folder) {
   return FS.readdir(folder).filter((name) => name !== '.' && name !== '..').flatMap((name) => {
     const path = `${folder}/${name}`;
@@ -89,17 +154,26 @@ function pathsBelow(FS, folder) {
   });
 }
 
+/**
+ * @param {Files} FS
+ * @param {Cache} cache
+ * @param {string} scope
+ */
 async function restore(FS, cache, scope) {
   FS.mkdirTree(STORE);
   const base = address(scope, '');
   for (const request of await cache.keys()) {
     const path = `${STORE}/${decodeURIComponent(request.url.slice(base.length))}`;
     FS.mkdirTree(path.slice(0, path.lastIndexOf('/')));
-    FS.writeFile(path, new Uint8Array(await (await cache.match(request)).arrayBuffer()));
+    const kept = /** @type {Response} */ (await cache.match(request));
+    FS.writeFile(path, new Uint8Array(await kept.arrayBuffer()));
   }
 }
 
-/** "slots/a"; empty where nothing is installed. */
+/**
+ * "slots/a"; empty where nothing is installed.
+ * @param {Files} FS
+ */
 function slotInUse(FS) {
   const current = `${STORE}/current`;
   if (!FS.analyzePath(current).exists) return '';
@@ -108,11 +182,17 @@ function slotInUse(FS) {
   return path.trim().replace(`${STORE}/`, '');
 }
 
-/** Stores all files, `current` last, and drops those that are gone. */
+/**
+ * Stores all files, `current` last, and drops those that are gone.
+ * @param {Files} FS
+ * @param {Cache} cache
+ * @param {string} scope
+ */
 async function save(FS, cache, scope) {
   const paths = pathsBelow(FS, STORE)
                     .map((path) => path.slice(STORE.length + 1))
                     .filter((path) => path !== 'lock' && path !== 'current');
+  /** @type {(path: string, bytes: BodyInit) => Promise<void>} */
   const put = (path, bytes) => cache.put(address(scope, path), new Response(bytes));
   for (const path of paths) await put(path, FS.readFile(`${STORE}/${path}`));
   const slot = slotInUse(FS);
@@ -123,7 +203,11 @@ async function save(FS, cache, scope) {
   }
 }
 
-/** The open bundle's patterns, their pictures put next to it. */
+/**
+ * The open bundle's patterns, their pictures put next to it.
+ * @param {Installer} module
+ * @param {string} stem
+ */
 function describe(module, stem) {
   const {FS} = module;
   const texts = textsOf(JSON.parse(module.UTF8ToString(module._update_meta()) || '{}'));
@@ -150,7 +234,10 @@ function describe(module, stem) {
   }
 }
 
-/** page.json: what site.json has of bundles, with `installed` set. */
+/**
+ * page.json: what site.json has of bundles, with `installed` set.
+ * @param {Installer} module
+ */
 function writePage(module) {
   const {FS} = module;
   const slot = slotInUse(FS);
@@ -180,6 +267,10 @@ function writePage(module) {
 /**
  * Whether the server's newest release is what the page has: then nothing is to be believed. What
  * cannot be read is not.
+ * @param {Downloads} files
+ * @param {Cache} cache
+ * @param {string} scope
+ * @param {Site} site
  */
 async function isCurrent(files, cache, scope, {epoch, version, hashes}) {
   const number = (await files.text('latest', LATEST_BYTES))?.trim();
@@ -190,12 +281,17 @@ async function isCurrent(files, cache, scope, {epoch, version, hashes}) {
   if (installed && isNewer(installed.release, {epoch, version}))
     return installed.release === release;
   try {
-    const wanted = JSON.parse(release).bundles.map(({hash}) => hash);
+    /** @type {string[]} */
+    const wanted = JSON.parse(release).bundles.map((/** @type {{hash: string}} */ {hash}) => hash);
     return wanted.length === hashes.length && wanted.every((hash) => hashes.includes(hash));
   } catch { return false; }
 }
 
-/** Downloads the installer's next request, in portions; at least one file, else the update ends. */
+/**
+ * Downloads the installer's next request, in portions; at least one file, else the update ends.
+ * @param {Installer} module
+ * @param {Downloads} files
+ */
 async function bringNext(module, files) {
   let size = 0;
   for (let i = 0; i === 0 || size < PORTION_BYTES; ++i) {
@@ -210,6 +306,11 @@ async function bringNext(module, files) {
   }
 }
 
+/**
+ * @param {Installer} module
+ * @param {Downloads} files
+ * @param {Site} site
+ */
 async function run(module, files, {url, key, epoch, version}) {
   const words = ['string', 'string', 'string', 'number', 'number', 'number'];
   for (;;) {
@@ -220,14 +321,17 @@ async function run(module, files, {url, key, epoch, version}) {
   }
 }
 
+/** @param {Site & {scope: string}} site */
 async function update({scope, ...site}) {
   const cache = await openStore(scope);
-  const files = new Brought(site.url, site.stall);
+  const files = new Downloads(site.url, site.stall);
   if (await isCurrent(files, cache, scope, site)) return {state: 'current'};
-  const module = await load({brought: (path, from) => files.take(path, from)});
+  const module = /** @type {Installer} */ (await load({
+    brought: (/** @type {string} */ path, /** @type {number} */ from) => files.take(path, from)
+  }));
   await restore(module.FS, cache, scope);
   const done = await run(module, files, site);
-  const told = (field) => module.UTF8ToString(module._update_error(field));
+  const told = (/** @type {number} */ field) => module.UTF8ToString(module._update_error(field));
   if (done > 0) writePage(module);
   // A failed one, too: its knowledge of keys and versions, and its downloaded pieces.
   await save(module.FS, cache, scope);
@@ -242,7 +346,7 @@ self.onmessage = async ({data}) => {
     self.postMessage(await (
         navigator.locks ? navigator.locks.request(cacheName(data.scope), locked) : locked()));
   } catch (error) {
-    self.postMessage(
-        {state: 'failed', code: error.code ?? error.name, text: String(error.message ?? error)});
+    const {code, name, message} = /** @type {Error & {code?: string}} */ (error);
+    self.postMessage({state: 'failed', code: code ?? name, text: String(message ?? error)});
   }
 };
