@@ -40,6 +40,7 @@ export const STAGE = {
  * @typedef {{ ask: (question: object, transfer?: Transferable[]) => Promise<any>, close: () => void
  * }} Decoder
  * @typedef {import('./download.js').Source} Source
+ * @typedef {(Arrival | RawArrival) & {inOrder?: boolean, tracked?: Part[] | null}} AnyArrival
  */
 
 /** @param {Uint8Array} start */

@@ -219,7 +219,7 @@ export class Engine {
   /**
    * Before pass(), in the context that is current. inOrder: bytes come as in a file; else what
    * showCoarse() shows is there.
-   * @param {boolean} inOrder
+   * @param {boolean} [inOrder]
    */
   beginRest(inOrder) { this.check(this.#module._web_begin_rest(inOrder ? 1 : 0)); }
 

@@ -1,3 +1,4 @@
+// @ts-check
 // Draws what modar.js sees: the frame in one canvas, the bundle's models over it in another. Both
 // change in the same task, so picture and models never part.
 import {RawArrival, STAGE} from './arrival.js';
@@ -30,11 +31,29 @@ const LIGHT_WIDTH = 160;
  */
 const FADE_MS = 250, FADE_MOVED = 0.03, FADE_FRAMES = 8;
 
+/**
+ * @typedef {import('./modar.js').Frame} Frame
+ * @typedef {import('./modar-view.js').Gesture} Gesture
+ * @typedef {import('./engine.js').Happened} Happened
+ * @typedef {import('./arrival.js').AnyArrival} AnyArrival
+ * @typedef {Parameters<typeof import('./modar-view.js').View.create>} Given
+ * @typedef {import('./media.js').Media} Media
+ *
+ * A picture over the models. triangles: of what it shows; fades: once something else was drawn.
+ * @typedef {{copy: HTMLCanvasElement, poses: Float32Array, triangles?: number, fades?: Animation}}
+ *     Faded
+ */
+
+/**
+ * @param {HTMLCanvasElement} canvas
+ * @param {boolean} webgl1
+ */
 function openContext(canvas, webgl1) {
   const attributes =
       {alpha: true, premultipliedAlpha: true, depth: true, stencil: false, antialias: true};
   const context2 = webgl1 ? null : canvas.getContext('webgl2', attributes);
-  const context = context2 ?? canvas.getContext('webgl', attributes);
+  const context = /** @type {WebGLRenderingContext | null} */ (
+      context2 ?? canvas.getContext('webgl', attributes));
   if (!context) {
     throw new ModarError({
       code: 'web.webgl',
@@ -42,10 +61,13 @@ function openContext(canvas, webgl1) {
       cure: 'switch on hardware acceleration in its settings, or use another browser',
     });
   }
-  return {context, version: context2 ? 2 : 1};
+  return {context, version: /** @type {1 | 2} */ (context2 ? 2 : 1)};
 }
 
-/** The build of the engine that this browser runs. Not for workers, which bundlers do not split. */
+/**
+ * The build of the engine that this browser runs. Not for workers, which bundlers do not split.
+ * @param {boolean} simd
+ */
 async function openEngine(simd) {
   const vectors = simd && hasSimd();
   const opened = async () => {
@@ -64,10 +86,10 @@ async function openEngine(simd) {
  * labels() has changed. `refined`: of a packed bundle more can be drawn than before.
  */
 export class View extends EventTarget {
-  #engine;
-  #picture;
-  #models;
-  #gl;
+  #engine = /** @type {Engine} */ (/** @type {unknown} */ (null));
+  #picture = /** @type {HTMLCanvasElement} */ (/** @type {unknown} */ (null));
+  #models = /** @type {HTMLCanvasElement} */ (/** @type {unknown} */ (null));
+  #gl = /** @type {ReturnType<typeof openContext>} */ (/** @type {unknown} */ (null));
   #lost = false;
   /** Until there is something to draw. */
   #empty = true;
@@ -80,22 +102,28 @@ export class View extends EventTarget {
   /** Of contexts, and what waits for a new one. */
   #losses = 0;
   #restored = Promise.resolve();
+  /** @type {(value?: undefined) => void} */
   #tellRestored = () => {};
-  /** The download of all of it. */
+  /**
+   * The download of all of it.
+   * @type {AnyArrival | null}
+   */
   #arrival = null;
   /**
    * The loader of levels when they are seen (lod-stream.js), of a bundle that is larger than
    * #maxBytes.
+   * @type {import('./lod-stream.js').LodStream | null}
    */
   #wanted = null;
-  #maxBytes;
+  #maxBytes = 0;
   #fixedLight = false;
+  /** @type {CanvasRenderingContext2D | null} */
   #small = null;
   #framesSinceLook = LIGHT_EVERY;
   #redraw = () => {};
   #mirror = false;
   /** Of media.js, which is loaded where a bundle has videos or sounds. */
-  #media = {
+  #media = /** @type {Media} */ (/** @type {unknown} */ ({
     sound: false,
     held: false,
     ended: [],
@@ -105,25 +133,23 @@ export class View extends EventTarget {
     upload() {},
     close() {},
     forget() {}
-  };
+  }));
+  /** @type {Happened[]} */
   #taps = [];
   #drawnAt = 0;
   #handle = 0;
+  /** @type {Map<number, boolean>} */
   #covered = new Map();
   #drawings = 0;
   /** Poses of the last drawing. */
-  #before = [];
-  /**
-   * A picture over the models: {copy, poses, triangles: of what it shows, fades: once something
-   * else was drawn}.
-   */
+  #before = /** @type {Float32Array} */ (/** @type {unknown} */ ([]));
+  /** @type {Faded | null} */
   #faded = null;
 
   /**
-   * @param {Modar | Uint8Array | Promise<Modar | Uint8Array>} bundle which may still be on its way
-   * @param canvases {picture, models}: laid over each other by the page; fixedLight: the models'
-   *     light does not follow the
-   * camera's picture
+   * @param {Given[0]} bundle which may still be on its way
+   * @param {Given[1]} options picture, models: laid over each other by the page;
+   *     fixedLight: the models' light does not follow the camera's picture
    */
   static async create(
       bundle,
@@ -136,7 +162,8 @@ export class View extends EventTarget {
     view.#gl = openContext(models, webgl1);
     view.#engine = await openEngine(simd);
     view.#engine.useContext(view.#gl.context, view.#gl.version);
-    const given = await bundle;
+    const given = /** @type {{arrival?: AnyArrival}} */ (/** @type {unknown} */ (await bundle));
+    /** @type {AnyArrival} */
     const arrival = given.arrival ?? new RawArrival(new Source(given));
     if (!given.arrival) await arrival.begin(new Uint8Array());
     view.#engine.arrive(arrival.size, arrival.found.splice(0));
@@ -158,7 +185,10 @@ export class View extends EventTarget {
     return view;
   }
 
-  /** Of a packed bundle the coarsest of everything. */
+  /**
+   * Of a packed bundle the coarsest of everything.
+   * @param {AnyArrival} arrival
+   */
   async #bringCoarse(arrival) {
     if (arrival.inOrder) return;
     await arrival.bring(STAGE.show, (offset, bytes) => this.#engine.put(offset, bytes));
@@ -167,6 +197,7 @@ export class View extends EventTarget {
     this.#tellRefined();
   }
 
+  /** @param {AnyArrival} arrival */
   async #refine(arrival) {
     if (arrival.size <= this.#maxBytes || this.#maxBytes === 0 || !await this.#bringWanted(arrival))
       await this.#bringRest(arrival);
@@ -174,8 +205,8 @@ export class View extends EventTarget {
 
   /**
    * Visible levels are loaded on demand.
-   * @returns false: this host or browser gives all or
-   * nothing
+   * @param {AnyArrival} arrival
+   * @returns false: this host or browser gives all or nothing
    */
   async #bringWanted(arrival) {
     const {LodStream} = await import('./lod-stream.js');
@@ -198,20 +229,22 @@ export class View extends EventTarget {
   /**
    * Cross-fade: overlays a snapshot of the current frame and fades it out. triangles: of the
    * present drawing; without, it is drawn again
+   * @param {number} [triangles]
    */
   #cover(triangles) {
     if (this.#faded || this.#empty || this.#lost || !this.#drawnAt) return;
     const models = this.#models;
     const {width, height, className, offsetLeft, offsetTop, clientWidth, clientHeight} = models;
     const copy = Object.assign(document.createElement('canvas'), {width, height, className});
-    copy.style = `position:absolute;left:${offsetLeft}px;top:${offsetTop}px;width:${
+    copy.style.cssText = `position:absolute;left:${offsetLeft}px;top:${offsetTop}px;width:${
         clientWidth}px;height:${clientHeight}px;pointer-events:none`;
     if (!triangles) this.#redraw();
-    copy.getContext('2d').drawImage(models, 0, 0);
+    /** @type {CanvasRenderingContext2D} */ (copy.getContext('2d')).drawImage(models, 0, 0);
     models.after(copy);
     this.#faded = {copy, poses: this.#before, triangles};
   }
 
+  /** @param {Faded} faded */
   #uncover(faded) {
     faded.copy.width = 0;  // its memory is free at once
     faded.copy.remove();
@@ -225,7 +258,10 @@ export class View extends EventTarget {
     this.#empty = this.#lost;
   }
 
-  /** Drawn data goes to the GPU, as often as that forgets it meanwhile. */
+  /**
+   * Drawn data goes to the GPU, as often as that forgets it meanwhile.
+   * @param {AnyArrival} arrival
+   */
   async #bringRest(arrival) {
     for (;;) {
       await this.#restored;
@@ -280,6 +316,8 @@ export class View extends EventTarget {
   /**
    * A node's words in the first of these languages that it has, else in any: {language, title,
    * text, alt}.
+   * @param {number} node
+   * @param {string[]} languages
    */
   wordsOf(node, languages = []) {
     for (const language of [...languages, ...this.#engine.languages]) {
@@ -292,6 +330,8 @@ export class View extends EventTarget {
   /**
    * The visitor tapped the canvas there, in CSS pixels from its top left: answers the node, or
    * null.
+   * @param {number} x
+   * @param {number} y
    */
   tap(x, y) {
     if (this.nodes.length === 0) return null;
@@ -302,7 +342,10 @@ export class View extends EventTarget {
     return found?.node ?? null;
   }
 
-  /** The visitor tapped a node: a label's button. */
+  /**
+   * The visitor tapped a node: a label's button.
+   * @param {number} node
+   */
   tapNode(node) { this.#tapped({node, material: 0}); }
 
   /** Actions begin anew, as if nothing had been found; videos and sounds stop. */
@@ -314,13 +357,22 @@ export class View extends EventTarget {
     this.#media.close();
   }
 
-  /** For captions of what plays from now on. */
+  /**
+   * For captions of what plays from now on.
+   * @param {string[]} languages
+   */
   set languages(languages) { this.#media.languages = languages; }
 
-  /** Of a video or sound: {language, captions (a WebVTT file), transcript}, or null. */
+  /**
+   * Of a video or sound: {language, captions (a WebVTT file), transcript}, or null.
+   * @param {number} node
+   */
   captionsOf(node) { return this.#media.captionsOf(node); }
 
-  /** 0 to 1. */
+  /**
+   * 0 to 1.
+   * @param {number} volume
+   */
   set volume(volume) { this.#media.volume = volume; }
 
   /**
@@ -360,6 +412,7 @@ export class View extends EventTarget {
     });
   }
 
+  /** @param {Happened} tap */
   #tapped(tap) {
     this.#taps.push(tap);
     this.#soon();
@@ -371,6 +424,7 @@ export class View extends EventTarget {
   /** Acts and repeats the last drawing. */
   #again() {
     const poses = this.#engine.poses().slice();
+    /** @type {(since: Float32Array, most: number) => boolean} */
     const moved = (since, most) =>
         since.some((value, i) => i % POSE_FLOATS >= POSE.view && Math.abs(value - poses[i]) > most);
     const still = !moved(this.#before, FADE_MOVED / FADE_FRAMES);
@@ -397,6 +451,7 @@ export class View extends EventTarget {
   #act() {
     if (this.nodes.length === 0 || (this.#plays && !this.#complete))
       return;  // what plays has to be there
+    /** @type {Happened[]} */
     const happened = [
       ...this.#media.ended.splice(0).map((node) => ({node, ended: true})), ...this.#taps.splice(0)
     ];
@@ -411,6 +466,10 @@ export class View extends EventTarget {
     if (!this.#lost) this.#media.upload(this.#gl.context);
   }
 
+  /**
+   * @param {string} type
+   * @param {unknown} detail
+   */
   #tell(type, detail) { this.dispatchEvent(new CustomEvent(type, {detail})); }
 
   #drawn() {
@@ -432,6 +491,7 @@ export class View extends EventTarget {
       this.#handle = requestAnimationFrame(() => this.#goOn(fresh));
   }
 
+  /** @param {boolean} webgl1 */
   #restore(webgl1) {
     this.#gl = openContext(this.#models, webgl1);
     const {context, version} = this.#gl;
@@ -467,16 +527,24 @@ export class View extends EventTarget {
     ++this.#losses;
   }
 
-  /** The picture alone, of a frame that nothing is known of. */
+  /**
+   * The picture alone, of a frame that nothing is known of.
+   * @param {Frame['source']} source
+   * @param {Gesture} gesture
+   */
   show(source, gesture) {
-    const camera = {
-      width: source.displayWidth ?? source.width,
-      height: source.displayHeight ?? source.height
-    };
+    const {displayWidth, displayHeight, width, height} =
+        /** @type {VideoFrame & HTMLCanvasElement} */ (source);
+    const camera = /** @type {Frame['camera']} */ (
+        {width: displayWidth ?? width, height: displayHeight ?? height});
     drawFrame(this.#picture, {source, camera}, gesture);
   }
 
-  /** frame: the detail of modar.js's event. gesture: {mirror, turn (radians), size}. */
+  /**
+   * frame: the detail of modar.js's event. gesture: {mirror, turn (radians), size}.
+   * @param {Frame} frame
+   * @param {Gesture} gesture
+   */
   draw({source, camera, poses}, gesture = {}) {
     const {width, height} = fitCanvases(this.#models, this.#picture);
     drawFrame(this.#picture, {source, camera}, gesture);
@@ -491,22 +559,39 @@ export class View extends EventTarget {
     this.#again();
   }
 
-  /** @see modar-view.d.ts */
+  /**
+   * @see modar-view.d.ts
+   * @param {string} name
+   * @param {number} scene
+   */
   stand(name, scene) { return this.#engine.stand({name}, scene); }
 
-  /** Undoes stand(). */
+  /**
+   * Undoes stand().
+   * @param {number} kept
+   */
   forgetPatterns(kept) { this.#engine.forgetPatterns(kept); }
 
-  /** The box of a pattern's content, in its space: {low, high}, or null where nothing does. */
+  /**
+   * The box of a pattern's content, in its space: {low, high}, or null where nothing does.
+   * @param {number} pattern
+   */
   bounds(pattern) { return this.#engine.bounds(pattern); }
 
   /**
    * The models of one pattern alone, without a camera's picture, as a camera sees them that stands
    * anywhere. view: pattern space to GL's eye space, column-major. focal: CSS pixels
+   * @param {number} pattern
+   * @param {Float32Array} view
+   * @param {number} focal
    */
   drawFrom(pattern, view, focal) { this.drawEach([[pattern, view]], focal); }
 
-  /** The same of several patterns, each with a view of its own: [[pattern, view]]. */
+  /**
+   * The same of several patterns, each with a view of its own: [[pattern, view]].
+   * @param {[number, Float32Array][]} views
+   * @param {number} focal
+   */
   drawEach(views, focal) {
     const size = fitCanvases(this.#models, this.#picture);
     this.#redraw = () => this.drawEach(views, focal);  // shown parts may have come meanwhile
@@ -523,7 +608,12 @@ export class View extends EventTarget {
     this.#again();
   }
 
-  /** As often as the player does, so that both show the same. */
+  /**
+   * As often as the player does, so that both show the same.
+   * @param {Frame['source']} source
+   * @param {Frame['camera']} camera
+   * @param {Float32Array} poses
+   */
   #look(source, camera, poses) {
     ++this.#framesSinceLook;
     const shown = poses.some((value, i) => i % POSE_FLOATS === POSE.shown && value !== 0);
@@ -532,9 +622,10 @@ export class View extends EventTarget {
     const [width, height] =
         [LIGHT_WIDTH, Math.max(1, Math.round((LIGHT_WIDTH * camera.height) / camera.width))];
     this.#small ??=
-        document.createElement('canvas').getContext('2d', {willReadFrequently: true, alpha: false});
+        /** @type {CanvasRenderingContext2D} */ (document.createElement('canvas').getContext(
+            '2d', {willReadFrequently: true, alpha: false}));
     if (this.#small.canvas.height !== height) Object.assign(this.#small.canvas, {width, height});
-    this.#small.drawImage(source, 0, 0, width, height);
+    this.#small.drawImage(/** @type {HTMLCanvasElement} */ (source), 0, 0, width, height);
     this.#engine.look(this.#small.getImageData(0, 0, width, height));
   }
 
@@ -545,7 +636,8 @@ export class View extends EventTarget {
   async photograph(type = 'image/jpeg') {
     const photo = document.createElement('canvas');
     Object.assign(photo, {width: this.#picture.width, height: this.#picture.height});
-    const context = photo.getContext('2d', {alpha: false});
+    const context =
+        /** @type {CanvasRenderingContext2D} */ (photo.getContext('2d', {alpha: false}));
     context.drawImage(this.#picture, 0, 0);
     if (!this.#lost) this.#redraw();
     context.drawImage(this.#models, 0, 0);

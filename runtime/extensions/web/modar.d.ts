@@ -178,3 +178,6 @@ export function projectionOf(
  */
 export function drawFrame(
   canvas: HTMLCanvasElement, frame: Pick<Frame, 'source' | 'camera'>, options?: { mirror?: boolean }): { width: number; height: number };
+
+/** For modar-view.js: makes canvases as large as the first of them is shown. @returns their size in pixels */
+export function fitCanvases(...canvases: HTMLCanvasElement[]): { width: number; height: number };

@@ -1,3 +1,4 @@
+// @ts-check
 // ModAR in a page: finds the pictures of a bundle in a video and says where they are.
 //
 //   import { load } from './modar.js';
@@ -13,7 +14,22 @@ import {allowMotion, Gyroscope} from './gyroscope.js';
 
 export {allowMotion, ModarError};
 
-/** Bundlers follow an address that is written out in the call. */
+/**
+ * @typedef {{width: number, height: number}} Size
+ * @typedef {import('./modar.js').Frame} Frame
+ * @typedef {import('./modar.js').Camera} Camera
+ * @typedef {import('./modar.js').Modar} Types
+ * @typedef {{resolve: (answer: unknown) => void, reject: (error: unknown) => void}} Waiting
+ *
+ * A frame to draw until release(), and the worker's message. captured, grabMs: milliseconds.
+ * @typedef {{source: Frame['source'], time: number, message: object, transfer: object[], release:
+ *     () => void, captured?: number, grabMs?: number}} Grabbed
+ */
+
+/**
+ * Bundlers follow an address that is written out in the call.
+ * @param {boolean} simd
+ */
 function openWorker(simd) {
   const stranded = strandedFile(`modar-worker-${simd ? 'simd' : 'plain'}.js`);
   if (stranded) return new Worker(stranded, {type: 'module'});
@@ -21,7 +37,10 @@ function openWorker(simd) {
                 new Worker(new URL('./modar-worker-plain.js', import.meta.url), {type: 'module'});
 }
 
-/** The same of the worker that makes records. */
+/**
+ * The same of the worker that makes records.
+ * @param {boolean} simd
+ */
 function openRecordWorker(simd) {
   const stranded = strandedFile(`record-worker-${simd ? 'simd' : 'plain'}.js`);
   if (stranded) return new Worker(stranded, {type: 'module'});
@@ -32,11 +51,15 @@ function openRecordWorker(simd) {
 /**
  * What open() makes. A browser starts no worker of another site's address, as that of a CDN, but
  * one of its own that imports it.
+ * @param {(simd: boolean) => Worker} open
+ * @param {boolean} simd
  */
 function startWorker(open, simd) {
   const {Worker} = globalThis;
-  let address;
-  globalThis.Worker = function asked(url) { address = new URL(url, document.baseURI); };
+  let address = /** @type {URL} */ (/** @type {unknown} */ (undefined));
+  globalThis.Worker = /** @type {typeof Worker} */ (
+      /** @type {unknown} */ (function asked(
+          /** @type {string | URL} */ url) { address = new URL(url, document.baseURI); }));
   try {
     open(simd);
   } finally { globalThis.Worker = Worker; }
@@ -56,18 +79,30 @@ globalThis.document?.addEventListener('securitypolicyviolation', ({effectiveDire
 /** A worker whose answers are promises; frames wait for one another. */
 class Calls {
   #worker;
+  /** @type {Map<number, Waiting>} */
   #waiting = new Map();
   #calls = 0;
-  /** Why nothing is answered any more. */
+  /**
+   * Why nothing is answered any more.
+   * @type {ModarError | null}
+   */
   #error = null;
-  /** Until the first answer: then the engine is there. */
-  #late = null;
+  /**
+   * Until the first answer: then the engine is there.
+   * @type {number | undefined}
+   */
+  #late;
 
+  /**
+   * @param {(simd: boolean) => Worker} open
+   * @param {boolean} simd
+   */
   constructor(open, simd) {
     this.#worker = startWorker(open, simd);
     this.#worker.onmessage = ({data}) => {
       clearTimeout(this.#late);
-      const {resolve, reject} = this.#waiting.get(data.call) ?? {};
+      const {resolve, reject} =
+          /** @type {Partial<Waiting>} */ (this.#waiting.get(data.call) ?? {});
       this.#waiting.delete(data.call);
       if (data.type === 'failed') reject?.(new ModarError(data.error));
       else resolve?.(data);
@@ -81,6 +116,7 @@ class Calls {
     };
   }
 
+  /** @param {string} cause */
   #giveUp(cause, code = 'web.worker', cure = 'load the page again') {
     this.#error ??= new ModarError({code, cause, cure});
     for (const {reject} of this.#waiting.values()) reject(this.#error);
@@ -98,13 +134,18 @@ class Calls {
           'it has to allow worker-src blob:');
   }
 
+  /**
+   * @param {object} message
+   * @param {object[]} transfer
+   * @returns {Promise<any>} the worker's answer to this message
+   */
   ask(message, transfer = []) {
     const call = ++this.#calls;
     this.#late ??= setTimeout(() => this.#giveUpLoading(), 1000 * ENGINE_S);
     return new Promise((resolve, reject) => {
       if (this.#error) reject(this.#error);
       this.#waiting.set(call, {resolve, reject});
-      this.#worker.postMessage({...message, call}, transfer);
+      this.#worker.postMessage({...message, call}, /** @type {Transferable[]} */ (transfer));
     });
   }
 
@@ -121,16 +162,21 @@ class Calls {
  */
 class FrameGrabber {
   #video;
-  /** Not in use: one is shown, one is tracked and one waits at most. */
+  /**
+   * Not in use: one is shown, one is tracked and one waits at most.
+   * @type {HTMLCanvasElement[]}
+   */
   #canvases = [];
+  /** @type {CanvasRenderingContext2D | null} */
   #small = null;
   useCanvas = typeof VideoFrame !== 'function';
 
+  /** @param {HTMLVideoElement} video */
   constructor(video) { this.#video = video; }
 
   /**
-   * {source, message, transfer, release}: what to draw until release(), and the worker's
-   * message.
+   * @param {number} time
+   * @returns {Grabbed}
    */
   grab(time) {
     const {videoWidth: width, videoHeight: height} = this.#video;
@@ -150,13 +196,23 @@ class FrameGrabber {
     };
   }
 
+  /**
+   * @param {number} time
+   * @param {number} width
+   * @param {number} height
+   * @param {number} shrink
+   * @returns {Grabbed}
+   */
   #copy(time, width, height, shrink) {
     const source = this.#canvases.pop() ?? document.createElement('canvas');
     if (source.width !== width || source.height !== height) Object.assign(source, {width, height});
-    source.getContext('2d', {alpha: false}).drawImage(this.#video, 0, 0);
+    /** @type {CanvasRenderingContext2D} */ (source.getContext('2d', {
+      alpha: false
+    })).drawImage(this.#video, 0, 0);
     const size = {width: Math.floor(width / shrink), height: Math.floor(height / shrink)};
     this.#small ??=
-        document.createElement('canvas').getContext('2d', {willReadFrequently: true, alpha: false});
+        /** @type {CanvasRenderingContext2D} */ (document.createElement('canvas').getContext(
+            '2d', {willReadFrequently: true, alpha: false}));
     const {canvas} = this.#small;
     if (canvas.width !== size.width || canvas.height !== size.height) Object.assign(canvas, size);
     this.#small.imageSmoothingQuality = 'medium';
@@ -175,11 +231,14 @@ class FrameGrabber {
 /**
  * Calls back for each new frame of the video, with its time in seconds, and when it was taken in
  * milliseconds, where the browser says so; answers a function that ends it.
+ * @param {HTMLVideoElement} video
+ * @param {(time: number, captured?: number) => void} callback
  */
 function onFrames(video, callback) {
   let handle = 0;
   const byFrame = 'requestVideoFrameCallback' in video;
   let seen = -1;
+  /** @type {(now: number, metadata?: {captureTime?: number}) => void} */
   const next = (now, metadata) => {
     // Without that callback, the screen's pace: a frame counts when the video's time has moved on.
     if (byFrame || video.currentTime !== seen) {
@@ -193,11 +252,18 @@ function onFrames(video, callback) {
   return () => (byFrame ? video.cancelVideoFrameCallback(handle) : cancelAnimationFrame(handle));
 }
 
-/** How much larger a frame is shown where it fills a viewport. */
+/**
+ * How much larger a frame is shown where it fills a viewport.
+ * @type {(camera: Size, viewport: Size) => number}
+ */
 const coverScale = (camera, {width, height}) =>
     Math.max(width / camera.width, height / camera.height);
 
-/** @see modar.d.ts */
+/**
+ * @see modar.d.ts
+ * @param {Camera} camera
+ * @param {Size} viewport
+ */
 export function projectionOf(camera, near = 0.05, far = 100, viewport = camera) {
   const scale = 2 * camera.focal * coverScale(camera, viewport);
   return Float32Array.of(
@@ -210,7 +276,8 @@ const MOST_PIXELS_A_CSS_PIXEL = 2;
 
 /**
  * Makes canvases as large as the first of them is shown.
- * @returns {width, height}, pixels
+ * @param {HTMLCanvasElement[]} canvases
+ * @returns {Size} pixels
  */
 export function fitCanvases(...canvases) {
   const scale = Math.min(globalThis.devicePixelRatio || 1, MOST_PIXELS_A_CSS_PIXEL);
@@ -222,14 +289,21 @@ export function fitCanvases(...canvases) {
   return {width, height};
 }
 
-/** @see modar.d.ts */
+/**
+ * @see modar.d.ts
+ * @param {HTMLCanvasElement} canvas
+ * @param {Pick<Frame, 'source' | 'camera'>} frame
+ */
 export function drawFrame(canvas, {source, camera}, {mirror = false} = {}) {
   const viewport = fitCanvases(canvas);
-  const context = canvas.getContext('2d', {alpha: false});
+  const context =
+      /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d', {alpha: false}));
   const scale = coverScale(camera, viewport);
   context.setTransform(
       mirror ? -scale : scale, 0, 0, scale, viewport.width / 2, viewport.height / 2);
-  context.drawImage(source, -camera.width / 2, -camera.height / 2, camera.width, camera.height);
+  context.drawImage(
+      /** @type {HTMLCanvasElement} */ (source), -camera.width / 2, -camera.height / 2,
+      camera.width, camera.height);
   return viewport;
 }
 
@@ -243,7 +317,7 @@ const MOST_ADDED = 8;
 
 /**
  * A picture's pixels, for a pattern.
- * @returns {pixels, width, height}
+ * @param {HTMLImageElement & VideoFrame} image or another picture
  */
 function pixelsOf(image) {
   const [wide, high] = [
@@ -252,10 +326,10 @@ function pixelsOf(image) {
   ];
   const scale = Math.min(1, ADDED_SIDE / Math.max(wide, high));
   const [width, height] = [Math.round(wide * scale), Math.round(high * scale)];
-  const context =
+  const context = /** @type {CanvasRenderingContext2D} */ (
       Object.assign(document.createElement('canvas'), {width, height}).getContext('2d', {
         willReadFrequently: true
-      });
+      }));
   context.fillStyle = '#fff';  // paper, where the picture is transparent
   context.fillRect(0, 0, width, height);
   context.imageSmoothingQuality = 'high';
@@ -264,24 +338,43 @@ function pixelsOf(image) {
 }
 
 export class Modar extends EventTarget {
-  #tracker;
+  #tracker = /** @type {Calls} */ (/** @type {unknown} */ (null));
+  /** @type {(() => void) | null} */
   #stopFrames = null;
+  /** @type {Grabbed | null} */
   #waiting = null;
   #busy = false;
+  /** @type {boolean[]} */
   #known = [];
   /** false: the plain builds of the engine. */
-  #simd;
-  /** Patterns of the bundle; null: no others were added. */
+  #simd = false;
+  /**
+   * Patterns of the bundle; null: no others were added.
+   * @type {number | null}
+   */
   #ofBundle = null;
-  #grabber = null;
+  #grabber = /** @type {FrameGrabber} */ (/** @type {unknown} */ (null));
   #runs = 0;
+  /** @type {Gyroscope | null} */
   #gyroscope = null;
-  /** When the last frame was taken that was tracked; undefined: unknown. */
+  /**
+   * When the last frame was taken that was tracked; undefined: unknown.
+   * @type {number | undefined}
+   */
   #trackedAt;
-  /** The loader of the bundle. */
+  /**
+   * The loader of the bundle.
+   * @type {import('./arrival.js').AnyArrival | null}
+   */
   arrival = null;
+  /** @type {import('./modar.js').Pattern[]} */
+  patterns = [];
 
-  /** @see load */
+  /**
+   * @see load
+   * @param {Parameters<typeof import('./modar.js').load>[0] | Source} bundle
+   * @param {Parameters<typeof import('./modar.js').load>[1]} options
+   */
   static async open(bundle, {simd = true, onProgress} = {}) {
     const modar = new Modar();
     modar.#simd = simd && hasSimd();
@@ -290,7 +383,7 @@ export class Modar extends EventTarget {
     const prepared = modar.#tracker.ask({type: 'prepare'});
     prepared.catch(() => {});  // told below
     const source = bundle instanceof Source ? bundle : new Source(bundle);
-    source.onProgress = onProgress;
+    source.onProgress = /** @type {Source['onProgress']} */ (onProgress);
     try {
       const start = await source.take(8);
       modar.arrival = isPacked(start) ?
@@ -301,7 +394,7 @@ export class Modar extends EventTarget {
       const {size, found, tracked = found} = modar.arrival;
       const {patterns, scenes, kind} =
           await modar.#tracker.ask({type: 'open', size, found: tracked});
-      modar.arrival.tracked = null;
+      /** @type {{tracked: unknown}} */ (modar.arrival).tracked = null;
       Object.assign(modar, {patterns, scenes, kind});
     } catch (error) {
       source.close();
@@ -311,7 +404,10 @@ export class Modar extends EventTarget {
     return modar;
   }
 
-  /** @see modar.d.ts */
+  /**
+   * @see modar.d.ts
+   * @param {Parameters<Types['addPattern']>[0]} image
+   */
   async addPattern(image, {name = '', widthMm = 0} = {}) {
     this.#ofBundle ??= this.patterns.length;
     if (this.patterns.length - this.#ofBundle >= MOST_ADDED) {
@@ -321,7 +417,7 @@ export class Modar extends EventTarget {
         cure: 'forget them first'
       });
     }
-    const picture = pixelsOf(image);
+    const picture = pixelsOf(/** @type {HTMLImageElement & VideoFrame} */ (image));
     const pattern = {name, widthMm};
     const maker = new Calls(openRecordWorker, this.#simd);
     try {
@@ -342,6 +438,7 @@ export class Modar extends EventTarget {
   /**
    * Tracks in the video, which is to play, until stop(). focal: in pixels of its longer side; 0:
    * unknown.
+   * @param {HTMLVideoElement} video
    */
   async start(
       video,
@@ -377,6 +474,11 @@ export class Modar extends EventTarget {
   /**
    * Tracks one gray frame (width * height bytes): for pictures that come from elsewhere. turn: see
    * modar.d.ts.
+   * @param {Uint8Array} gray
+   * @param {number} width
+   * @param {number} height
+   * @param {number} time
+   * @param {[number, number, number]} [turn]
    */
   async step(gray, width, height, time, turn) {
     const pixels = gray.slice().buffer;
@@ -384,8 +486,14 @@ export class Modar extends EventTarget {
         {type: 'frame', kind: 'gray', time, width, height, pixels, turn}, [pixels]);
   }
 
-  /** The newest frame waits while one is tracked; older ones are dropped. */
+  /**
+   * The newest frame waits while one is tracked; older ones are dropped.
+   * @param {number} time
+   * @param {number | undefined} captured
+   * @param {number} run
+   */
   #take(time, captured, run) {
+    /** @type {Grabbed} */
     let grabbed;
     try {
       const began = performance.now();
@@ -405,13 +513,15 @@ export class Modar extends EventTarget {
     if (!this.#busy) this.#pump(run);
   }
 
+  /** @param {number} run */
   async #pump(run) {
     this.#busy = true;
     while (this.#waiting) {
       const grabbed = this.#waiting;
       this.#waiting = null;
       try {
-        const turn = this.#gyroscope?.turn(this.#trackedAt, grabbed.captured);
+        const turn = this.#gyroscope?.turn(
+            /** @type {number} */ (this.#trackedAt), /** @type {number} */ (grabbed.captured));
         const answer = await this.#tracker.ask(
             {...grabbed.message, turn, keepLuma: this.keepLuma}, grabbed.transfer);
         if (answer.type === 'unreadable') {
@@ -428,6 +538,10 @@ export class Modar extends EventTarget {
     this.#busy = false;
   }
 
+  /**
+   * @param {import('./modar-worker.js').Tracked} answer
+   * @param {Grabbed} grabbed
+   */
   #tell(answer, {source, time, grabMs}) {
     const {poses} = answer;
     const camera = {
@@ -444,6 +558,7 @@ export class Modar extends EventTarget {
       const {name} = this.patterns[pattern];
       if (shown) {
         projection ??= projectionOf(camera);
+        /** @type {(from: number, count: number) => Float32Array} */
         const part = (from, count) => pose.slice(from, from + count);
         const detail = {
           pattern,
@@ -472,10 +587,15 @@ export class Modar extends EventTarget {
       }
       this.#known[pattern] = shown;
     }
-    this.dispatchEvent(new CustomEvent(
-        'frame', {detail: {...answer, copyMs: grabMs + answer.copyMs, camera, source, time}}));
+    this.dispatchEvent(new CustomEvent('frame', {
+      detail:
+          {...answer, copyMs: /** @type {number} */ (grabMs) + answer.copyMs, camera, source, time}
+    }));
   }
 }
 
-/** Opens a bundle: its address, or its bytes. */
+/**
+ * Opens a bundle: its address, or its bytes.
+ * @type {(...words: Parameters<typeof import('./modar.js').load>) => Promise<Modar>}
+ */
 export function load(bundle, options) { return Modar.open(bundle, options); }
