@@ -1,3 +1,4 @@
+// @ts-check
 // A picture of the visitor's own: photographed, its corners marked, laid flat, tracked, and kept on
 // this device alone.
 import {ModarError} from './engine.js';
@@ -15,8 +16,18 @@ const STEP = 1;
 const LARGE_STEP = 16;
 
 /**
+ * @typedef {[number, number]} Point x, y in pixels
+ *
+ * An element of the dialog.
+ * @typedef {HTMLElement & Pick<HTMLDialogElement, 'showModal' | 'close'> &
+ *     Pick<HTMLInputElement, 'disabled' | 'value'>} Part
+ */
+
+/**
  * The map from the unit square to a quadrangle of four corners, clockwise from the top left: P.
  * Heckbert, 1989.
+ * @param {Point[]} corners
+ * @returns {(u: number, v: number) => Point}
  */
 function squareTo([[x0, y0], [x1, y1], [x2, y2], [x3, y3]]) {
   const [ax, ay, bx, by] = [x1 - x2, y1 - y2, x3 - x2, y3 - y2];
@@ -36,6 +47,7 @@ function squareTo([[x0, y0], [x1, y1], [x2, y2], [x3, y3]]) {
 /**
  * Clockwise, without an inner angle of half a turn and more: what a flat rectangle looks like in a
  * photo.
+ * @param {Point[]} corners
  */
 export function isConvex(corners) {
   return corners.every(([x, y], i) => {
@@ -52,8 +64,12 @@ const LOOK_SIDE = 192;
 /** Sum of the differences in red, green and blue from which a pixel is not part of the table. */
 const OFF_TABLE = 48;
 
-/** 1 where a pixel has none of the colours of the photo's rim. */
+/**
+ * 1 where a pixel has none of the colours of the photo's rim.
+ * @param {ImageData} photo
+ */
 function offTable({data, width, height}) {
+  /** @type {number[]} */
   const rim = [];
   for (let x = 0; x < width; x += 4) rim.push(x, (height - 1) * width + x);
   for (let y = 0; y < height; y += 4) rim.push(y * width, y * width + width - 1);
@@ -69,11 +85,17 @@ function offTable({data, width, height}) {
 /**
  * The pixels of one value of a mask that hang together with `start`, as [x, y]; they become
  * `mark`.
+ * @param {number} start
+ * @param {Uint8Array} mask
+ * @param {number} width
+ * @param {number} value
+ * @param {number} mark
  */
 function partFrom(start, mask, width, value, mark) {
+  /** @type {Point[]} */
   const part = [];
   for (const open = [start]; open.length > 0;) {
-    const at = open.pop();
+    const at = /** @type {number} */ (open.pop());
     if (mask[at] !== value) continue;
     mask[at] = mark;
     const x = at % width;
@@ -85,7 +107,11 @@ function partFrom(start, mask, width, value, mark) {
   return part;
 }
 
-/** The largest thing on the table, with what of it has the table's colour. */
+/**
+ * The largest thing on the table, with what of it has the table's colour.
+ * @param {Uint8Array} mask
+ * @param {number} width
+ */
 function largestThing(mask, width) {
   const [table, seen] = [2, 3];
   for (let i = 0; i < mask.length; ++i) {
@@ -94,6 +120,7 @@ function largestThing(mask, width) {
     if (onRim && mask[i] === 0) partFrom(i, mask, width, 0, table);
   }
   const things = mask.map((value) => (value === table ? 0 : 1));
+  /** @type {Point[]} */
   let best = [];
   for (let i = 0; i < things.length; ++i) {
     const part = things[i] === 1 ? partFrom(i, things, width, 1, seen) : [];
@@ -102,7 +129,13 @@ function largestThing(mask, width) {
   return best;
 }
 
-/** The line through the part's rim along a side, as [nx, ny, d]: least squares of the distances. */
+/**
+ * The line through the part's rim along a side, as [nx, ny, d]: least squares of the distances.
+ * @param {Point} from
+ * @param {Point} to
+ * @param {Point[]} rim
+ * @returns {[number, number, number]}
+ */
 function lineAlong([ax, ay], [bx, by], rim) {
   const length = Math.hypot(bx - ax, by - ay);
   const [ux, uy] = [(bx - ax) / length, (by - ay) / length];
@@ -110,7 +143,8 @@ function lineAlong([ax, ay], [bx, by], rim) {
     const along = ((x - ax) * ux + (y - ay) * uy) / length;
     return along > 0.1 && along < 0.9 && Math.abs((x - ax) * uy - (y - ay) * ux) < 0.06 * length;
   });
-  const mean = (i) => near.reduce((sum, point) => sum + point[i], 0) / near.length;
+  const mean = (/** @type {0 | 1} */ i) =>
+      near.reduce((sum, point) => sum + point[i], 0) / near.length;
   const [mx, my] = [mean(0), mean(1)];
   let [xx, xy, yy] = [0, 0, 0];
   for (const [x, y] of near) {
@@ -120,9 +154,10 @@ function lineAlong([ax, ay], [bx, by], rim) {
   }
   const turn = 0.5 * Math.atan2(2 * xy, xx - yy);
   const normal = [-Math.sin(turn), Math.cos(turn)];
-  return [...normal, normal[0] * mx + normal[1] * my];
+  return /** @type {[number, number, number]} */ ([...normal, normal[0] * mx + normal[1] * my]);
 }
 
+/** @type {(one: [number, number, number], other: [number, number, number]) => Point} */
 const crossing =
     ([a, b, c],
      [d, e, f]) => [(c * e - b * f) / (a * e - b * d), (a * f - c * d) / (a * e - b * d)];
@@ -131,18 +166,22 @@ const crossing =
  * The corners of one thing on a plain table, in a photo's pixels; null where there is no such
  * thing.
  * @param {HTMLCanvasElement} photo
+ * @returns {Point[] | null}
  */
 export function findCorners(photo) {
   const scale = LOOK_SIDE / Math.max(photo.width, photo.height);
   const [width, height] = [Math.round(photo.width * scale), Math.round(photo.height * scale)];
-  const small = canvasOf(photo, width, height).getContext('2d').getImageData(0, 0, width, height);
+  const context =
+      /** @type {CanvasRenderingContext2D} */ (canvasOf(photo, width, height).getContext('2d'));
+  const small = context.getImageData(0, 0, width, height);
   const part = largestThing(offTable(small), width);
   if (part.length < 0.05 * width * height) return null;
   const inside = new Set(part.map(([x, y]) => y * width + x));
   const rim = part.filter(
       ([x, y]) => [[1, 0], [-1, 0], [0, 1], [0, -1]].some(
           ([dx, dy]) => !inside.has((y + dy) * width + x + dx)));
-  const most = (value) => rim.reduce((best, point) => (value(point) > value(best) ? point : best));
+  const most = (/** @type {(point: Point) => number} */ value) =>
+      rim.reduce((best, point) => (value(point) > value(best) ? point : best));
   const rough = [
     most(([x, y]) => -x - y), most(([x, y]) => x - y), most(([x, y]) => x + y),
     most(([x, y]) => y - x)
@@ -163,14 +202,17 @@ export function findCorners(photo) {
  * The picture between four corners of a photo, as from the front: the mean of four places for each
  * pixel.
  * @param {ImageData} photo
+ * @param {Point[]} corners
  */
 export function flatten(photo, corners) {
+  /** @type {(i: number, k: number) => number} */
   const length = (i, k) => Math.hypot(corners[i][0] - corners[k][0], corners[i][1] - corners[k][1]);
   const [wide, high] = [(length(0, 1) + length(3, 2)) / 2, (length(0, 3) + length(1, 2)) / 2];
   const scale = Math.min(1, FLAT_SIDE / Math.max(wide, high));
   const flat =
       new ImageData(Math.max(1, Math.round(wide * scale)), Math.max(1, Math.round(high * scale)));
   const place = squareTo(corners);
+  /** @type {(sums: number[], x: number, y: number) => void} */
   const add = (sums, x, y) => {
     const [x0, y0] = [
       Math.min(photo.width - 2, Math.max(0, Math.floor(x))),
@@ -197,9 +239,15 @@ export function flatten(photo, corners) {
   return flat;
 }
 
+/**
+ * @param {HTMLCanvasElement | ImageData} image
+ * @param {number} width
+ * @param {number} height
+ */
 function canvasOf(image, width, height) {
   const canvas = Object.assign(document.createElement('canvas'), {width, height});
-  const context = canvas.getContext('2d', {willReadFrequently: true});
+  const context =
+      /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d', {willReadFrequently: true}));
   if (image instanceof ImageData) context.putImageData(image, 0, 0);
   else context.drawImage(image, 0, 0, width, height);
   return canvas;
@@ -207,27 +255,34 @@ function canvasOf(image, width, height) {
 
 /** The dialog `own` of index.html, and what it has made. */
 export class OwnPictures {
-  #$ = (id) => document.getElementById(id);
+  #$ = (/** @type {string} */ id) => /** @type {Part} */ (document.getElementById(id));
   #viewer;
   #cache;
+  /** @type {Record<string, string>} */
   #words = {};
+  /** @type {Point[]} */
   #corners = [];
-  #photo = null;
+  #photo = /** @type {ImageData} */ (/** @type {unknown} */ (null));
 
-  /** kept: the name of the Cache that they are kept in. */
+  /**
+   * kept: the name of the Cache that they are kept in.
+   * @param {import('./modar-viewer.js').ModarViewer} viewer
+   * @param {string} kept
+   */
   constructor(viewer, kept) {
     this.#viewer = viewer;
     this.#cache = () => caches.open(kept);
     this.#listen();
   }
 
+  /** @param {Record<string, string>} words */
   set words(words) {
     this.#words = words;
     this.#handles.forEach(
         (handle, i) => handle.setAttribute('aria-label', fill(words.ownCorner, {number: i + 1})));
   }
 
-  get #handles() { return [...this.#$('own-corners').children]; }
+  get #handles() { return /** @type {HTMLElement[]} */ ([...this.#$('own-corners').children]); }
 
   // ---- storage ----
 
@@ -237,10 +292,11 @@ export class OwnPictures {
     const cache = await this.#cache();
     for (const request of await cache.keys()) {
       try {
-        const kept = await cache.match(request);
+        const kept = /** @type {Response} */ (await cache.match(request));
         await this.#add(
             await createImageBitmap(await kept.blob()), Number(kept.headers.get('x-scene')) || 0);
-      } catch ({code = ''}) {
+      } catch (error) {
+        const {code = ''} = /** @type {{code?: string}} */ (error);
         // No picture, or of a bundle with fewer scenes: what the network or the browser lacks, the
         // next visit may have.
         if (!code.startsWith('web.') || code === 'web.scene') await cache.delete(request);
@@ -248,6 +304,10 @@ export class OwnPictures {
     }
   }
 
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {number} scene
+   */
   async #keep(canvas, scene) {
     if (!globalThis.caches) return;
     const blob = await new Promise((resolve) => {
@@ -259,15 +319,24 @@ export class OwnPictures {
         new Response(blob, {headers: {'content-type': 'image/png', 'x-scene': String(scene)}}));
   }
 
+  /**
+   * @param {HTMLCanvasElement | ImageBitmap} image
+   * @param {number} scene
+   */
   #add(image, scene) { return this.#viewer.addPattern(image, {name: this.#words.ownName, scene}); }
 
   // ---- the dialog ----
 
-  /** Shows a photo in it. The bundle is loaded. */
+  /**
+   * Shows a photo in it. The bundle is loaded.
+   * @param {Blob} file
+   */
   async open(file) {
     let image;
     try {
-      image = await createImageBitmap(file, {imageOrientation: 'from-image'});
+      image = await createImageBitmap(file, {
+        imageOrientation: /** @type {ImageOrientation} */ (/** @type {unknown} */ ('from-image'))
+      });
     } catch {
       this.#tell(this.#words.ownUnreadable);
       this.#$('own').showModal();
@@ -275,21 +344,24 @@ export class OwnPictures {
     }
     const scale = Math.min(1, PHOTO_SIDE / Math.max(image.width, image.height));
     const [width, height] = [Math.round(image.width * scale), Math.round(image.height * scale)];
-    const canvas = this.#$('own-photo');
+    const canvas =
+        /** @type {HTMLCanvasElement} */ (/** @type {HTMLElement} */ (this.#$('own-photo')));
     Object.assign(canvas, {width, height});
-    canvas.getContext('2d').drawImage(image, 0, 0, width, height);
-    this.#photo = canvas.getContext('2d').getImageData(0, 0, width, height);
+    const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext('2d'));
+    context.drawImage(image, 0, 0, width, height);
+    this.#photo = context.getImageData(0, 0, width, height);
     const inset =
         [[MARGIN, MARGIN], [1 - MARGIN, MARGIN], [1 - MARGIN, 1 - MARGIN], [MARGIN, 1 - MARGIN]];
     this.#corners = findCorners(canvas) ?? inset.map(([x, y]) => [x * width, y * height]);
     this.#tell('');
-    const {scenes} = this.#viewer.modar;
-    this.#$('own-scene').replaceChildren(...scenes.map(({model}, i) => new Option(model, i)));
+    const {scenes} = /** @type {import('./modar.js').Modar} */ (this.#viewer.modar);
+    this.#$('own-scene').replaceChildren(...scenes.map(({model}, i) => new Option(model, `${i}`)));
     this.#$('own-which').hidden = scenes.length < 2;
     this.#$('own').showModal();
     this.#show();
   }
 
+  /** @param {string} problem */
   #tell(problem) {
     this.#$('own-problem').textContent = problem;
     this.#$('own-use').disabled = false;
@@ -298,9 +370,8 @@ export class OwnPictures {
   #show() {
     const {width, height} = this.#photo;
     this.#$('own-quad').setAttribute('viewBox', `0 0 ${width} ${height}`);
-    this.#$('own-quad')
-        .firstElementChild.setAttribute(
-            'points', this.#corners.map((corner) => corner.join()).join(' '));
+    /** @type {Element} */ (this.#$('own-quad').firstElementChild)
+        .setAttribute('points', this.#corners.map((corner) => corner.join()).join(' '));
     this.#handles.forEach((handle, i) => {
       const [x, y] = this.#corners[i];
       handle.style.left = `${(100 * x) / width}%`;
@@ -309,6 +380,11 @@ export class OwnPictures {
     this.#$('own-use').disabled = !isConvex(this.#corners);
   }
 
+  /**
+   * @param {number} i
+   * @param {number} x
+   * @param {number} y
+   */
   #move(i, x, y) {
     const {width, height} = this.#photo;
     this.#corners[i] = [Math.min(width, Math.max(0, x)), Math.min(height, Math.max(0, y))];
@@ -327,12 +403,17 @@ export class OwnPictures {
       this.#$('own').close('added');
     } catch (error) {
       const plain = error instanceof ModarError && error.code.startsWith('pattern.');
-      this.#tell(plain ? this.#words.ownPlain : String(error.message ?? error));
+      this.#tell(
+          plain ? this.#words.ownPlain : String(/** @type {Error} */ (error).message ?? error));
     }
   }
 
+  /**
+   * @param {HTMLElement} handle
+   * @param {number} i
+   */
   #listenToHandle(handle, i) {
-    const at = ({clientX, clientY}) => {
+    const at = (/** @type {PointerEvent} */ {clientX, clientY}) => {
       const {left, top, width, height} = this.#$('own-photo').getBoundingClientRect();
       this.#move(
           i, ((clientX - left) / width) * this.#photo.width,
