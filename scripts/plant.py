@@ -172,7 +172,8 @@ def main():
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     options = parser.parse_args()
     room = options.room.rstrip("/")
-    groups = tests_of(room)
+    rooms = [room, *(prefix for prefix in TESTS if prefix.startswith(room + "/"))]
+    groups = list(dict.fromkeys(group for each in rooms for group in tests_of(each)))
     copy_tree()
     # As the commit's, which the copy has not.
     os.environ["SOURCE_DATE_EPOCH"] = subprocess.run(["git", "log", "-1", "--format=%ct"], cwd=ROOT, capture_output=True, text=True).stdout.strip()
@@ -192,7 +193,7 @@ def main():
             if build(targets, options.jobs).returncode != 0:
                 skipped += 1
                 continue
-            by = failing_test(groups, options.jobs)
+            by = failing_test(tests_of(str(path)), options.jobs)
         finally:
             (TREE / path).write_text(before)
         tried += 1
