@@ -1,15 +1,26 @@
 // @ts-check
+/// <reference path="types.d.ts" />
 // The studio's server, as a page calls it. Addresses are relative: the secret is in the page's own.
 
 /** What the server refused: words for people. */
 export class Refused extends Error {
+  cure = '';
+  file = '';
+  line = 0;
+  code = '';
+  /** @type {string | string[] | undefined} what must be installed */
+  package = undefined;
+  /** @type {Studio.Point[] | undefined} of a photo: its own */
+  corners = undefined;
+
   /**
    * @param {{ error: string }} told
-   * @param {number} status
+   * @param {number} status of HTTP; 0: there is no server
    */
   constructor({error, ...rest}, status) {
     super(error);
-    Object.assign(this, {cure: '', file: '', line: 0, ...rest, status});
+    Object.assign(this, rest);
+    this.status = status;
   }
 }
 

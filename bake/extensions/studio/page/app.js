@@ -1,7 +1,8 @@
+// @ts-check
 // The studio: a bar of steps, and the step that the address names: #/scene/cover.
 import {ask} from './api.js';
 import {Files, filesOf, receive} from './files.js';
-import {icon, meter, percent, tool} from './parts.js';
+import {icon, meter, part, percent, tool} from './parts.js';
 import {Picture} from './picture.js';
 import {Scene} from './scene.js';
 import {Ship} from './ship.js';
@@ -17,10 +18,13 @@ const VIEWS = {
   try: Try,
   ship: Ship
 };
+/** @typedef {keyof typeof VIEWS} View */
+const STEPS = /** @type {View[]} */ (Object.keys(VIEWS));
 /** Milliseconds that a message stays, unless it is pointed at or reports an error. */
 const NOTICE_MS = 6000;
 
 let noticeTimer = 0;
+/** @type {typeof state.notice} */
 let noticed = null;
 let ended = false;
 let draggedOver = false;
@@ -28,7 +32,7 @@ let draggedOver = false;
 /** {view, name} of the address. A name that the project does not have falls back to the first. */
 function place() {
   const [view, ...name] = location.hash.replace(/^#\/?/, '').split('/');
-  const known = view in VIEWS ? view : 'files';
+  const known = STEPS.find((each) => each === view) ?? 'files';
   const wanted = decodeURIComponent(name.join('/'));
   const {patterns} = state.project;
   return {
@@ -37,10 +41,17 @@ function place() {
   };
 }
 
+/**
+ * @param {View} view
+ * @param {string} pattern
+ */
 export const addressOf = (view, pattern = '') =>
     `#/${view}${pattern ? `/${encodeURIComponent(pattern)}` : ''}`;
 
-/** What each step waits for: null where it may be opened. */
+/**
+ * What each step waits for: null where it may be opened.
+ * @param {View} view
+ */
 function obstacle(view) {
   const {patterns, models} = state.project;
   if (view === 'picture' && !patterns.length) return t('needPicture');
@@ -51,8 +62,12 @@ function obstacle(view) {
 
 // ---- the bar ----
 
+/**
+ * @param {View} now
+ * @param {Studio.Pattern | null} pattern
+ */
 function steps(now, pattern) {
-  return m('nav.steps', {'aria-label': t('steps')}, m('ol', Object.keys(VIEWS).map((view, i) => {
+  return m('nav.steps', {'aria-label': t('steps')}, m('ol', STEPS.map((view, i) => {
              const why = obstacle(view);
              return m(
                  'li', {key: view},
@@ -83,6 +98,10 @@ function status() {
   return m('span.status', icon('check'), t('prepared', {size: bytes(project.bundle.bytes)}));
 }
 
+/**
+ * @param {View} now
+ * @param {Studio.Pattern | null} pattern
+ */
 function bar(now, pattern) {
   const {project} = state;
   return m(
@@ -144,6 +163,7 @@ function hush() {
 
 /** Files may be dropped anywhere, at any time. */
 function dropping() {
+  /** @param {DragEvent} event */
   const over = (event) => {
     if (!event.dataTransfer?.types.includes('Files')) return;
     event.preventDefault();
@@ -174,7 +194,8 @@ function shortcuts() {
   addEventListener('keydown', (event) => {
     const key = event.key.toLowerCase();
     if (!(event.ctrlKey || event.metaKey) || event.altKey || !['z', 'y'].includes(key)) return;
-    if (event.target.matches?.('textarea, input[type="text"]')) return;
+    const {target} = event;
+    if (target instanceof Element && target.matches('textarea, input[type="text"]')) return;
     event.preventDefault();
     (key === 'y' || event.shiftKey ? redo : undo)();
   });
@@ -190,13 +211,13 @@ const Studio = {
                           m('main.end', {'aria-busy': 'true'}, m('p', t('opening')));
     const {view, pattern} = place();
     const shown = obstacle(view) ? 'files' : view;
+    const attributes = {
+      pattern,
+      key: shown === 'picture' || shown === 'scene' ? `${shown} ${pattern.name}` : shown
+    };
     return [
       bar(shown, pattern),
-      m('main', {'aria-labelledby': 'title', class: shown}, m(VIEWS[shown], {
-          pattern,
-          key: shown === 'picture' || shown === 'scene' ? `${shown} ${pattern.name}` : shown
-        })),
-      notice(),
+      m('main', {'aria-labelledby': 'title', class: shown}, m(VIEWS[shown], attributes)), notice(),
       draggedOver && m('aside.drop-here', {'aria-label': t('dropHere')}, m('p', t('dropHere')))
     ];
   },
@@ -204,15 +225,16 @@ const Studio = {
 
 /** Who comes by keys or a screen reader begins at the screen's head. */
 function opened() {
-  document.activeElement
-      ?.blur();  // typed text counts, and is stored while its field is still there
+  const focused = document.activeElement;
+  if (focused instanceof HTMLElement)
+    focused.blur();  // typed text counts, and is stored while its field is still there
   m.redraw();
   requestAnimationFrame(() => document.getElementById('title')?.focus({preventScroll: true}));
 }
 
 async function begin() {
   await useLanguage(firstLanguage());
-  m.mount(document.getElementById('studio'), Studio);
+  m.mount(part(document.body, '#studio', HTMLElement), Studio);
   addEventListener('hashchange', opened);
   dropping();
   shortcuts();

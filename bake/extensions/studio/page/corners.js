@@ -1,4 +1,6 @@
+// @ts-check
 // Four corners on a photo, dragged with a magnifier or moved by a pixel with the arrow keys.
+import {part} from './parts.js';
 import {t} from './words.js';
 
 const m = window.m;
@@ -8,6 +10,7 @@ const ZOOM = 4;
 /** Milliseconds after the last key until the corners count as set. */
 const KEYS_REST_MS = 500;
 const NAMES = ['cornerTopLeft', 'cornerTopRight', 'cornerBottomRight', 'cornerBottomLeft'];
+/** @type {Record<string, Studio.Point>} */
 const WAYS = {
   ArrowLeft: [-1, 0],
   ArrowRight: [1, 0],
@@ -16,24 +19,36 @@ const WAYS = {
 };
 
 /**
- * Attributes: photo (address), size [w, h] (photo pixels), corners [[x, y] x 4], onmove(corners)
- * while they move, onset(corners) when they rest.
+ * photo: address. size: width and height of it, pixels, which corners are in. onmove: while they
+ * move. onset: when they rest.
+ * @typedef {object} CornersAttributes
+ * @property {string} photo
+ * @property {Studio.Point} size
+ * @property {Studio.Point[]} corners
+ * @property {(corners: Studio.Point[]) => unknown} onmove
+ * @property {(corners: Studio.Point[]) => unknown} onset
  */
+/** @typedef {Studio.Vnode<CornersAttributes>} CornersVnode */
+
 export class Corners {
-  oninit({attrs}) {
+  /** @param {CornersVnode} vnode */
+  constructor({attrs}) {
+    this.attrs = attrs;
     this.corners = attrs.corners.map((corner) => [...corner]);
     this.held = -1;
     this.timer = 0;
+    this.dom = document.body;  // until oncreate()
+    this.observer = new ResizeObserver(() => this.paint());
   }
 
-  oncreate({dom, attrs}) {
+  /** @param {CornersVnode} vnode */
+  oncreate({dom}) {
     this.dom = dom;
-    this.attrs = attrs;
-    this.observer = new ResizeObserver(() => this.paint());
     this.observer.observe(dom);
     this.paint();
   }
 
+  /** @param {CornersVnode} vnode */
   onupdate({attrs}) {
     this.attrs = attrs;
     if (this.held < 0 && !this.timer) this.corners = attrs.corners.map((corner) => [...corner]);
@@ -60,7 +75,7 @@ export class Corners {
   paint() {
     const {scale, left, top} = this.fit();
     const [width, height] = this.attrs.size;
-    const sheet = this.dom.querySelector('.sheet');
+    const sheet = part(this.dom, '.sheet', HTMLElement);
     Object.assign(sheet.style, {
       left: `${left}px`,
       top: `${top}px`,
@@ -68,10 +83,12 @@ export class Corners {
       height: `${height * scale}px`
     });
     const outline = this.corners.map(([x, y]) => `${x},${y}`).join(' ');
-    this.dom.querySelector('polygon').setAttribute('points', outline);
-    this.dom.querySelector('.shade').setAttribute(
-        'd', `M0 0H${width}V${height}H0Z M${this.corners.map(([x, y]) => `${x} ${y}`).join('L')}Z`);
-    this.dom.querySelectorAll('.corner').forEach((handle, i) => {
+    part(this.dom, 'polygon', SVGElement).setAttribute('points', outline);
+    const hole = this.corners.map(([x, y]) => `${x} ${y}`).join('L');
+    part(this.dom, '.shade', SVGElement).setAttribute('d', `M0 0H${width}V${height}H0Z M${hole}Z`);
+    /** @type {NodeListOf<HTMLElement>} */
+    const handles = this.dom.querySelectorAll('.corner');
+    handles.forEach((handle, i) => {
       const [x, y] = this.corners[i];
       Object.assign(handle.style, {left: `${x * scale}px`, top: `${y * scale}px`});
       handle.setAttribute(
@@ -80,22 +97,24 @@ export class Corners {
     this.paintLens(scale);
   }
 
+  /** @param {number} scale */
   paintLens(scale) {
-    const lens = this.dom.querySelector('.lens');
+    const lens = part(this.dom, '.lens', HTMLCanvasElement);
     lens.hidden = this.held < 0;
     if (this.held < 0) return;
     const [x, y] = this.corners[this.held];
     const dense = devicePixelRatio || 1;
     if (lens.width !== Math.round(LENS * dense))
       lens.width = lens.height = Math.round(LENS * dense);
+    /** @type {(at: number, most: number) => number} */
     const away = (at, most) =>
         (at > most / 2 ? -LENS - 28 : 28);  // next to the finger, towards the middle
     const [width, height] = this.attrs.size;
     Object.assign(
         lens.style,
         {left: `${x * scale + away(x, width)}px`, top: `${y * scale + away(y, height)}px`});
-    const photo = this.dom.querySelector('img');
-    const context = lens.getContext('2d');
+    const photo = part(this.dom, 'img', HTMLImageElement);
+    const context = /** @type {CanvasRenderingContext2D} */ (lens.getContext('2d'));
     const zoom = ZOOM * scale * dense;
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.fillStyle = '#777';
@@ -103,9 +122,10 @@ export class Corners {
     context.setTransform(zoom, 0, 0, zoom, lens.width / 2 - x * zoom, lens.height / 2 - y * zoom);
     context.imageSmoothingEnabled = zoom < 3;
     if (photo.complete && photo.naturalWidth) context.drawImage(photo, 0, 0, width, height);
+    /** @type {(colour: string, thickness: number) => void} */
     const draw = (colour, thickness) => {
       context.beginPath();
-      this.corners.forEach((corner) => context.lineTo(...corner));
+      this.corners.forEach(([x, y]) => context.lineTo(x, y));
       context.closePath();
       Object.assign(context, {strokeStyle: colour, lineWidth: thickness / zoom});
       context.stroke();
@@ -114,6 +134,11 @@ export class Corners {
     draw('#fff', 1.5 * dense);
   }
 
+  /**
+   * @param {number} corner
+   * @param {number} x
+   * @param {number} y
+   */
   move(corner, x, y) {
     const [width, height] = this.attrs.size;
     this.corners[corner] = [Math.min(width, Math.max(0, x)), Math.min(height, Math.max(0, y))];
@@ -127,12 +152,16 @@ export class Corners {
     this.attrs.onset(this.corners.map(([x, y]) => [Number(x.toFixed(2)), Number(y.toFixed(2))]));
   }
 
-  /** The pointer need not be in the corner's middle: it keeps its distance. */
+  /**
+   * The pointer need not be in the corner's middle: it keeps its distance.
+   * @param {Studio.On<PointerEvent>} event
+   * @param {number} corner
+   */
   press(event, corner) {
     event.redraw = false;
     if (event.button !== 0) return;
     event.preventDefault();
-    const handle = event.currentTarget;
+    const handle = /** @type {HTMLElement} */ (event.currentTarget);
     handle.setPointerCapture(event.pointerId);
     handle.focus({preventScroll: true});
     const {scale} = this.fit();
@@ -140,7 +169,6 @@ export class Corners {
     this.held = corner;
     this.paint();
     handle.onpointermove = (move) => {
-      move.redraw = false;
       this.move(
           corner, from.at[0] + (move.clientX - from.x) / scale,
           from.at[1] + (move.clientY - from.y) / scale);
@@ -153,6 +181,10 @@ export class Corners {
     };
   }
 
+  /**
+   * @param {Studio.On<KeyboardEvent>} event
+   * @param {number} corner
+   */
   key(event, corner) {
     event.redraw = false;
     const way = WAYS[event.key];
@@ -166,6 +198,7 @@ export class Corners {
     this.timer = setTimeout(() => this.rest(), KEYS_REST_MS);
   }
 
+  /** @param {Studio.On<FocusEvent>} event */
   leave(event) {
     event.redraw = false;
     this.held = -1;
@@ -173,6 +206,7 @@ export class Corners {
     if (this.timer) this.rest();
   }
 
+  /** @param {CornersVnode} vnode */
   view({attrs}) {
     const [width, height] = attrs.size;
     return m(

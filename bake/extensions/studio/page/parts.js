@@ -1,3 +1,4 @@
+// @ts-check
 // Parts that every screen is made of. What people wrote is only ever text: nothing here or
 // elsewhere makes HTML of it.
 import {inUnit, number, numberIn, sentence, settings, t, typed, UNITS} from './words.js';
@@ -5,6 +6,13 @@ import {inUnit, number, numberIn, sentence, settings, t, typed, UNITS} from './w
 const m = window.m;
 /** Milliseconds after the last step of a number until it counts. */
 const STEPS_REST_MS = 350;
+/** @type {Record<string, number>} steps of a number by its keys */
+const WAYS = {
+  ArrowUp: 1,
+  ArrowDown: -1,
+  PageUp: 10,
+  PageDown: -10
+};
 
 const SHAPES = {
   picture: 'M4 5h16v14H4z M4 16l5-5 4 4 3-3 4 4 M15.5 9.5h.01',
@@ -36,21 +44,61 @@ const SHAPES = {
   size: 'M6 18L18 6 M11 6h7v7 M6 11v7h7',
 };
 
+/** @typedef {keyof typeof SHAPES} Shape */
+
+/**
+ * A part of an element that is always there.
+ * @template {Element} Kind
+ * @param {Element} dom
+ * @param {string} selector
+ * @param {new () => Kind} kind
+ * @returns {Kind}
+ */
+export function part(dom, selector, kind) {
+  const found = dom.querySelector(selector);
+  if (found instanceof kind) return found;
+  throw new Error(`no ${selector} on the page`);
+}
+
+/**
+ * @param {Shape} name
+ * @param {Studio.Attributes} [attributes]
+ */
 export const icon = (name, attributes = {}) =>
     m('svg.icon', {viewBox: '0 0 24 24', 'aria-hidden': 'true', ...attributes},
       m('path', {d: SHAPES[name]}));
 
-/** A button; busy ones answer no second press. */
+/**
+ * A button; busy ones answer no second press.
+ * @param {string} label
+ * @param {() => unknown} onclick
+ * @param {Studio.Attributes & { kind?: string, shape?: Shape, after?: Shape }} options
+ */
 export const button = (label, onclick, {kind = '', shape, after, ...rest} = {}) =>
     m(`button${kind}`, {type: 'button', onclick, ...rest}, shape && icon(shape), m('span', label),
       after && icon(after));
 
-/** A button that is a picture alone; its name is read and shown as a tip. */
+/**
+ * A button that is a picture alone; its name is read and shown as a tip.
+ * @param {string} label
+ * @param {Shape} shape
+ * @param {() => unknown} onclick
+ * @param {Studio.Attributes} [rest]
+ */
 export const tool = (label, shape, onclick, rest = {}) =>
     m('button.tool', {type: 'button', onclick, title: label, 'aria-label': label, ...rest},
       icon(shape));
 
-/** One of several, as a row of choices: [[value, label, shape?]...]. */
+/**
+ * One of several, as a row of choices.
+ * @template {string} Value
+ * @param {string} name
+ * @param {string} label
+ * @param {[value: Value, label: string, shape?: Shape][]} options
+ * @param {Value} value
+ * @param {(chosen: Value) => unknown} onchoose
+ * @param {{ kind?: string }} look
+ */
 export const choice = (name, label, options, value, onchoose, {kind = ''} = {}) =>
     m(`fieldset.choice${kind}`, m('legend', label),
       m('div.options',
@@ -66,16 +114,33 @@ export const choice = (name, label, options, value, onchoose, {kind = ''} = {}) 
                   m('span', shape && icon(shape), text)))));
 
 /**
- * A number that is typed, or stepped with the arrow keys, and told once it is complete.
- * Attributes: id, label, value (null: empty), unit, step, least, most, digits, empty (whether it
- * may be), onvalue.
+ * value: null where the field is empty, which `empty` allows; onvalue is called with null then.
+ * @typedef {object} FieldAttributes
+ * @property {string} id
+ * @property {string} label
+ * @property {number | null} [value]
+ * @property {number} [step]
+ * @property {number} [least]
+ * @property {number} [most]
+ * @property {number} [digits]
+ * @property {boolean} [empty]
+ * @property {(value: number) => unknown} onvalue
  */
+/**
+ * @typedef {Studio.Vnode<FieldAttributes & { unit?: Studio.Child },
+ *     { draft: string | null, timer: number }>} NumberVnode
+ */
+
+/** A number that is typed, or stepped with the arrow keys, and told once it is complete. */
 export const NumberField = {
+  /** @param {NumberVnode} vnode */
   oninit({state}) {
     state.draft = null;
     state.timer = 0;
   },
+  /** @param {NumberVnode} vnode */
   onremove({state}) { clearTimeout(state.timer);},
+  /** @param {NumberVnode} vnode */
   view({attrs, state}) {
     const {
       id,
@@ -89,9 +154,12 @@ export const NumberField = {
       empty = false,
       onvalue
     } = attrs;
+    const tell = /** @type {(value: number | null) => unknown} */ (onvalue);
     const shown = state.draft ??
         (value === null || value === undefined ? '' : typed(Number(value.toFixed(digits))));
+    /** @param {number} wanted */
     const within = (wanted) => Math.min(most, Math.max(least, Number(wanted.toFixed(digits))));
+    /** @param {Studio.On<Event>} [event] */
     const finish = (event) => {
       clearTimeout(state.timer);
       // A field that is taken away loses the focus while the page is drawn, where Mithril would
@@ -104,10 +172,11 @@ export const NumberField = {
       const wanted = numberIn(state.draft);
       state.draft = null;
       if (wanted === null && !empty) return;
-      if (wanted !== value) onvalue(wanted === null ? null : within(wanted));
+      if (wanted !== value) tell(wanted === null ? null : within(wanted));
     };
+    /** @param {Studio.On<KeyboardEvent>} event */
     const keys = (event) => {
-      const way = {ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10}[event.key];
+      const way = WAYS[event.key];
       if (event.key === 'Enter') finish();
       else if (event.key === 'Escape') state.draft = null;
       else if (way) {
@@ -144,9 +213,11 @@ export const NumberField = {
 
 /** A length in millimetres, in the unit that the person measures with. */
 export const LengthField = {
+  /** @param {Studio.Vnode<FieldAttributes & { choose?: boolean }>} vnode */
   view({
     attrs: {value, step = 1, least = -Infinity, most = Infinity, onvalue, choose = false, ...rest}
   }) {
+    const tell = /** @type {(value: number | null) => unknown} */ (onvalue);
     const {unit} = settings;
     const factor = UNITS[unit];
     const units = choose &&
@@ -166,14 +237,16 @@ export const LengthField = {
       step: unit === 'mm' ? step : step / 10,
       least: least / factor,
       most: most / factor,
-      onvalue: (wanted) => onvalue(wanted === null ? null : wanted * factor)
+      onvalue: (/** @type {number | null} */ wanted) =>
+          tell(wanted === null ? null : wanted * factor)
     });
   },
 };
 
 /**
- * What a person reads of something that is not well: {text, cure, severity, lang, detail}, see
- * said().
+ * What a person reads of something that is not well, see said().
+ * @param {Studio.Said} what
+ * @param {Studio.Child[]} more
  */
 export const finding = ({text, cure, detail, severity = 'warning', lang}, ...more) =>
     m(`div.finding.${severity}`,
@@ -185,24 +258,40 @@ export const finding = ({text, cure, detail, severity = 'warning', lang}, ...mor
         cure && m('p.cure', {dir: 'auto', lang}, sentence(cure)),
         detail && m('small', {dir: 'auto', lang: 'en'}, detail), more));
 
+/** @param {string | null} letter */
 export const grade = (letter) => letter &&
     m('span.grade',
       {class: `grade-${letter}`, 'aria-label': t('gradeOf', {grade: letter}), role: 'img'}, letter);
 
+/** @param {number} share */
 export const percent = (share) => `${number(Math.round(100 * share))} %`;
 
-/** How far along work is: 0 to 1. */
+/**
+ * How far along work is: 0 to 1.
+ * @param {number} share
+ * @param {string} label
+ */
 export const meter = (share, label) => m('progress', {max: 1, value: share, 'aria-label': label});
 
-/** A screen's head, which gets the focus when the screen is opened. */
+/**
+ * A screen's head, which gets the focus when the screen is opened.
+ * @param {Studio.Child} title
+ * @param {string} [lead]
+ */
 export const head = (title, lead) =>
     m('div.head', m('h1', {tabindex: -1, id: 'title'}, title), lead && m('p', lead));
 
-/** For an image that cannot be had: parts under it are visible. */
+/**
+ * For an image that cannot be had: parts under it are visible.
+ * @param {Studio.On<Event, HTMLImageElement>} event
+ */
 export const noThumb = (event) => {
   event.redraw = false;
   event.target.hidden = true;
 };
 
-/** Users' names are isolated: their direction is their own. */
+/**
+ * Users' names are isolated: their direction is their own.
+ * @param {string} text
+ */
 export const name = (text) => m('bdi', text);

@@ -1,12 +1,13 @@
+// @ts-check
 // Step 2: where the picture is in the photo, how large it is in the world, and how well a phone
 // will know it.
-import {ask, askJson, Newest, thumb} from './api.js';
+import {ask, askJson, Newest, Refused, thumb} from './api.js';
 import {Corners} from './corners.js';
-import {unsure} from './files.js';
-import {button, choice, finding, grade, head, icon, LengthField, name, NumberField, tool} from './parts.js';
+import {toHundredths, unsure} from './files.js';
+import {button, choice, finding, grade, head, icon, LengthField, name, NumberField, part, tool} from './parts.js';
 import {rail} from './rail.js';
 import {arcOf, alongOf, widthOf} from './surface.js';
-import {addScene, deleteAsset, loadRivals, loadScore, patternOf, setPattern, state, tellError} from './state.js';
+import {addScene, deleteAsset, isGone, loadRivals, loadScore, patternOf, setPattern, state, tellError} from './state.js';
 import {number, said, t} from './words.js';
 
 const m = window.m;
@@ -16,13 +17,17 @@ const m = window.m;
  */
 const STAGE_PX = 2000;
 const PREVIEW_PX = [360, 224];
-/** Millimetres, the shorter side first. */
+/** @typedef {'a4' | 'a5' | 'postcard'} Paper */
+/** @type {Record<Paper, Studio.Point>} millimetres, the shorter side first */
 const PAPERS = {
   a4: [210, 297],
   a5: [148, 210],
   postcard: [105, 148]
 };
+const SHEETS = /** @type {Paper[]} */ (Object.keys(PAPERS));
+/** @type {Studio.Side[]} */
 const SIDES = ['right', 'left', 'top', 'bottom', 'back'];
+/** @type {[Studio.Kind, import('./parts.js').Shape][]} */
 const KINDS = [['flat', 'flat'], ['cylinder', 'label'], ['cone', 'cup'], ['box', 'box']];
 
 /**
@@ -31,36 +36,56 @@ const KINDS = [['flat', 'flat'], ['cylinder', 'label'], ['cone', 'cup'], ['box',
  */
 const RIVALS_AFTER_MS = 1500;
 
+/** @typedef {'top' | 'bottom' | 'arc' | 'along' | 'width' | 'height' | 'depth'} Length */
+/**
+ * A shape so far. Its top and bottom are diameters; sides has the files of a box.
+ * @typedef {Partial<Record<Length, number | null>> & { sides?: Studio.Pattern['sides'] }} Typed
+ */
+
+/** @type {(a: number, b: number) => boolean} */
 const near = (a, b) => Math.abs(a - b) < 0.6;  // millimetres
 
-/** What surface.js takes for diameters; null: they are not all told. */
-const diameters = (kind, {top, bottom}) =>
-    (kind === 'cone' ? top && bottom && {top_mm: top, bottom_mm: bottom} : top && {top_mm: top}) ||
-    null;
+/**
+ * What surface.js takes for diameters; null: they are not all told.
+ * @param {Studio.Kind} kind
+ * @param {Typed} shape
+ */
+function diameters(kind, {top, bottom}) {
+  if (!top || kind === 'cone' && !bottom) return null;
+  return kind === 'cone' ? {top_mm: top, bottom_mm: bottom} : {top_mm: top};
+}
 
-/** Upright sizes of photos by file, for those that the project does not state. */
+/** @type {Map<string, Studio.Point | null>} upright sizes of photos by file */
 const photoSizes = new Map();
 
 // ---- shown at once ----
 
 /**
- * The picture as the phone will know it, made anew while a corner is dragged. Attributes: pattern,
- * score, handle(preview).
+ * @typedef {Studio.Vnode<{ pattern: Studio.Pattern, score: Studio.Score | null,
+ *     handle: (preview: Preview) => void }>} PreviewVnode
  */
+
+/** The picture as the phone will know it, made anew while a corner is dragged. */
 class Preview {
-  oninit({attrs}) {
+  /** @param {PreviewVnode} vnode */
+  constructor({attrs}) {
     this.newest = new Newest((wanted) => this.fetch(wanted));
+    /** @type {Studio.Point | null} */
     this.size = null;
+    this.attrs = attrs;
+    this.dom = document.body;  // until oncreate()
     attrs.handle(this);
   }
 
+  /** @param {PreviewVnode} vnode */
   oncreate({dom, attrs}) {
     this.dom = dom;
-    this.attrs = attrs;
     this.show(attrs.pattern.corners);
   }
 
+  /** @param {PreviewVnode} vnode */
   onupdate({attrs}) {
+    /** @param {Studio.Pattern} pattern */
     const lookOf = ({corners, width_mm: width, height_mm: height}) =>
         JSON.stringify([corners, width, height]);
     const changed = lookOf(this.attrs.pattern) !== lookOf(attrs.pattern);
@@ -68,12 +93,16 @@ class Preview {
     if (changed) this.show(attrs.pattern.corners);
   }
 
-  /** moving: earlier knowledge of the picture no longer holds. */
+  /**
+   * moving: earlier knowledge of the picture no longer holds.
+   * @param {Studio.Point[] | null} corners
+   */
   show(corners, moving = false) {
     this.dom.classList.toggle('moving', moving);
     this.newest.ask({corners, size: PREVIEW_PX[moving ? 1 : 0]});
   }
 
+  /** @param {{ corners: Studio.Point[] | null, size: number }} wanted */
   async fetch({corners, size}) {
     const {pattern} = this.attrs;
     const began = performance.now();
@@ -86,9 +115,9 @@ class Preview {
           corners ? ask('POST', 'rectify', {file: pattern.file, corners, ...sides, size}) :
                     fetch(thumb(pattern.file, size)));
       const image = await createImageBitmap(await answer.blob());
-      const canvas = this.dom.querySelector('canvas');
+      const canvas = part(this.dom, 'canvas', HTMLCanvasElement);
       Object.assign(canvas, {width: image.width, height: image.height});
-      canvas.getContext('2d').drawImage(image, 0, 0);
+      canvas.getContext('2d')?.drawImage(image, 0, 0);
       Object.assign(
           canvas.dataset,
           {shown: JSON.stringify(corners), ms: String(Math.round(performance.now() - began))});
@@ -96,14 +125,15 @@ class Preview {
       image.close();
       this.dom.classList.remove('impossible');
     } catch (error) {
-      if (error.status === 0) tellError(error);
+      if (isGone(error)) tellError(error);
       this.dom.classList.add(
           'impossible');  // corners that are no quadrilateral: the last picture stays, pale
     }
   }
 
+  /** @param {PreviewVnode} vnode */
   view({attrs: {pattern, score}}) {
-    const most = score && Math.max(score.width, score.height);
+    const most = score ? Math.max(score.width, score.height) : 0;
     return m(
         'div.preview', m('canvas', {role: 'img', 'aria-label': t('preview', {name: pattern.name})}),
         score &&
@@ -124,10 +154,15 @@ class Preview {
 
 // ---- how good it is ----
 
+/** @param {number} cm */
 const distance = (cm) =>
     (Math.round(cm) >= 100 ? `${number(Number((cm / 100).toFixed(1)))} m` :
                              `${number(Number(cm.toFixed(cm < 10 ? 1 : 0)))} cm`);
 
+/**
+ * @param {Studio.Score} score
+ * @param {number | null} width
+ */
 function reach({range_cm: known, range_widths: widths}, width) {
   const range = known ?? (width && widths?.map((each) => (each * width) / 10));
   if (range) return t('range', {near: distance(range[0]), far: distance(range[1])});
@@ -136,6 +171,7 @@ function reach({range_cm: known, range_widths: widths}, width) {
       '';
 }
 
+/** @param {Studio.Pattern} pattern */
 function verdict(pattern) {
   const score = state.scores.get(pattern.name);
   if (!score) loadScore(pattern.name);
@@ -146,8 +182,10 @@ function verdict(pattern) {
       m('p.small', reach(score, widthOf(pattern))));
 }
 
+/** @param {Studio.Pattern} pattern */
 function advice(pattern) {
-  const {advice: some = []} = state.scores.get(pattern.name) ?? {};
+  const score = state.scores.get(pattern.name);
+  const some = score && !score.pending && !score.failed ? score.advice : [];
   const rivals = state.rivals.get(pattern.name);
   return m(
       'div.advice', {'aria-live': 'polite'},
@@ -164,20 +202,32 @@ function advice(pattern) {
 
 // ---- the screen ----
 
-/** Attributes: pattern. Incomplete choices are kept here: a paper, a shape without its sizes. */
+/** @typedef {Studio.Vnode<{ pattern: Studio.Pattern }>} PictureVnode */
+
+/** Incomplete choices are kept here: a paper, a shape without its sizes. */
 export class Picture {
-  oninit({attrs}) {
+  /** @param {PictureVnode} vnode */
+  constructor({attrs}) {
+    this.timer = 0;
     this.compare(attrs.pattern);
-    this.paper = this.kind = null;
+    /** @type {string | null} */
+    this.paper = null;
+    /** @type {Studio.Kind | null} */
+    this.kind = null;
+    /** @type {Typed} */
     this.shape = {};
     this.features = true;
     this.naming = false;
+    /** @type {Preview | null} */
+    this.preview = null;
   }
 
+  /** @param {PictureVnode} vnode */
   onupdate({attrs}) { this.compare(attrs.pattern); }
 
   onremove() { clearTimeout(this.timer); }
 
+  /** @param {Studio.Pattern} pattern */
   compare({name: pattern}) {
     if (this.timer || state.rivals.has(pattern)) return;
     this.timer = setTimeout(() => {
@@ -186,37 +236,48 @@ export class Picture {
     }, RIVALS_AFTER_MS);
   }
 
-  /** The width and height of a sheet in the picture's orientation. */
+  /**
+   * The width and height of a sheet in the picture's orientation.
+   * @param {Paper} paper
+   */
   sheet(paper) {
     const [short, long] = PAPERS[paper];
     const [width, height] = this.preview?.size ?? [1, 1];
     return width > height ? [long, short] : [short, long];
   }
 
+  /** @param {Studio.Pattern} pattern */
   paperOf({width_mm: width, height_mm: height, corners}) {
     if (!width) return 'later';
-    return Object.keys(PAPERS).find(
+    return SHEETS.find(
                (paper) => [PAPERS[paper], [...PAPERS[paper]].reverse()].some(
                    ([w, h]) => near(w, width) && (height ? near(h, height) : !corners))) ??
         'other';
   }
 
+  /**
+   * @param {Studio.Pattern} pattern
+   * @param {string} paper
+   */
   choosePaper(pattern, paper) {
     this.paper = paper === 'other' ? paper : null;
     if (paper === 'later')
       setPattern(
           pattern.name,
           {...(pattern.width_mm && {width: null}), ...(pattern.height_mm && {height: null})});
-    if (!(paper in PAPERS)) return;
-    const [width, height] = this.sheet(paper);
+    const chosen = SHEETS.find((each) => each === paper);
+    if (!chosen) return;
+    const [width, height] = this.sheet(chosen);
     setPattern(pattern.name, {
       width: `${width}mm`,
       ...(pattern.corners && {height: `${height}mm`})
     });  // a scan has its own proportions
   }
 
+  /** @param {Studio.Pattern} pattern */
   sizes(pattern) {
     const paper = this.paper ?? this.paperOf(pattern);
+    /** @type {(key: string) => (mm: number | null) => unknown} */
     const set = (key) => (mm) =>
         setPattern(pattern.name, {[key]: mm === null ? null : `${Number(mm.toFixed(1))}mm`});
     return [
@@ -249,6 +310,10 @@ export class Picture {
     ];
   }
 
+  /**
+   * @param {Studio.Pattern} pattern
+   * @param {Studio.Kind} kind
+   */
   chooseKind(pattern, kind) {
     this.kind = kind === pattern.kind ? null : kind;
     this.shape = {};
@@ -257,10 +322,15 @@ export class Picture {
     setPattern(pattern.name, {shape: null});
   }
 
-  /** Sizes of the project, or as typed so far; complete ones are written. */
+  /**
+   * Sizes of the project, or as typed so far; complete ones are written.
+   * @param {Studio.Pattern} pattern
+   * @param {Studio.Kind} kind
+   * @returns {Typed}
+   */
   shapeOf(pattern, kind) {
-    const {top_mm: top, bottom_mm: bottom, arc_deg: arc, box_mm: box, sides} =
-        pattern.kind === kind ? pattern : {};
+    if (pattern.kind !== kind) return this.shape;
+    const {top_mm: top, bottom_mm: bottom, arc_deg: arc, box_mm: box, sides} = pattern;
     return {
       top,
       bottom,
@@ -268,19 +338,24 @@ export class Picture {
       width: box?.[0],
       height: box?.[1],
       depth: box?.[2],
-      ...sides,
+      sides,
       ...this.shape
     };
   }
 
+  /**
+   * @param {Studio.Pattern} pattern
+   * @param {Studio.Kind} kind
+   * @param {Typed} values
+   */
   setShape(pattern, kind, values) {
     Object.assign(this.shape, values);
     const {along} = this.shape;
     const round = diameters(kind, this.shapeOf(pattern, kind));
     if (along && round)
       Object.assign(this.shape, {along: undefined, arc: Number(arcOf(round, along).toFixed(1))});
-    const {along: _, top, bottom, arc, width, height, depth, ...sides} =
-        this.shapeOf(pattern, kind);
+    const {top, bottom, arc, width, height, depth, sides = {}} = this.shapeOf(pattern, kind);
+    /** @param {number} value */
     const mm = (value) => `${Number(value.toFixed(2))}mm`;
     const words = kind === 'cylinder' ?
         top && arc && [`diameter=${mm(top)}`, `arc=${arc}`] :
@@ -293,7 +368,7 @@ export class Picture {
     if (!words) return;
     // The shape tells the width; of a photo, the front's height makes its proportions those of the
     // box.
-    const tall = kind === 'box' && pattern.corners ? mm(height) : null;
+    const tall = kind === 'box' && pattern.corners && height ? mm(height) : null;
     const sizes = {
       ...(pattern.width_mm && {width: null}),
       ...((tall || pattern.height_mm) && {height: tall})
@@ -304,7 +379,12 @@ export class Picture {
     });
   }
 
-  boxSide(pattern, shape, side) {
+  /**
+   * @param {Studio.Pattern} pattern
+   * @param {Typed} shape
+   * @param {Studio.Side} side
+   */
+  boxSide(pattern, {sides}, side) {
     return m(
         'div.field',
         m('label',
@@ -313,19 +393,24 @@ export class Picture {
           t(`side.${side}`)),
         m('select', {
           id: `side-${side}`,
-          onchange: (event) =>
-              this.setShape(pattern, 'box', {[side]: event.target.value || undefined}),
+          onchange: (event) => this.setShape(
+              pattern, 'box', {sides: {...sides, [side]: event.target.value || undefined}}),
         },
           m('option', {value: ''}, t('none')),
           state.project.patterns.filter((other) => other !== pattern)
               .map(
                   (other) =>
-                      m('option', {value: other.file, selected: shape[side] === other.file},
+                      m('option', {value: other.file, selected: sides?.[side] === other.file},
                         other.name))));
   }
 
+  /**
+   * @param {Studio.Pattern} pattern
+   * @param {Studio.Kind} kind
+   */
   shapeFields(pattern, kind) {
     const shape = this.shapeOf(pattern, kind);
+    /** @type {(key: Length, label: string, choose?: boolean) => Studio.Drawn} */
     const size = (key, label, choose = false) => m(LengthField, {
       id: key,
       label,
@@ -367,6 +452,7 @@ export class Picture {
     ];
   }
 
+  /** @param {Studio.Pattern} pattern */
   shapes(pattern) {
     const kind = this.kind ?? pattern.kind;
     return [
@@ -378,13 +464,17 @@ export class Picture {
     ];
   }
 
-  /** Its name, which visitors read, and a field to change it. */
+  /**
+   * Its name, which visitors read, and a field to change it.
+   * @param {Studio.Pattern} pattern
+   */
   title(pattern) {
     if (!this.naming) {
       return m('div.titled', head(name(pattern.name)), tool(t('rename'), 'pencil', () => {
                  this.naming = true;
                }));
     }
+    /** @param {Studio.On<Event>} event */
     const done = (event) => {
       const wanted = event.target.value.trim();
       this.naming = false;
@@ -414,22 +504,22 @@ export class Picture {
   /**
    * A frontal file becomes a photo: its corners are looked for, and are the photo's own where none
    * stand out.
+   * @param {Studio.Pattern} pattern
    */
   async cutOut(pattern) {
     try {
       const {corners, sure} = await askJson('POST', 'corners', {file: pattern.file});
       if (!sure) unsure.add(pattern.name);
-      await setPattern(
-          pattern.name,
-          {corners: corners.map((corner) => corner.map((value) => Number(value.toFixed(2))))});
+      await setPattern(pattern.name, {corners: toHundredths(corners)});
     } catch (error) {
-      if (!error.corners) tellError(error);
-      else await setPattern(pattern.name, {corners: error.corners});
+      const own = error instanceof Refused ? error.corners : undefined;
+      if (!own) tellError(error);
+      else await setPattern(pattern.name, {corners: own});
     }
   }
 
+  /** @param {Studio.Pattern} pattern */
   photoSize(pattern) {
-    if (pattern.photo) return pattern.photo;
     const known = photoSizes.get(pattern.file);
     if (known === undefined) {
       photoSizes.set(pattern.file, null);
@@ -443,16 +533,17 @@ export class Picture {
     return known ?? null;
   }
 
+  /** @param {Studio.Pattern} pattern */
   stage(pattern) {
     const size = pattern.corners && this.photoSize(pattern);
     if (pattern.corners && !size) return null;
-    if (size) {
+    if (pattern.corners && size) {
       return [
         m(Corners, {
           photo: thumb(pattern.file, STAGE_PX),
           size,
           corners: pattern.corners,
-          onmove: (corners) => this.preview.show(corners, true),
+          onmove: (corners) => this.preview?.show(corners, true),
           onset: (corners) => {
             unsure.delete(pattern.name);
             setPattern(pattern.name, {corners});
@@ -468,13 +559,17 @@ export class Picture {
     ];
   }
 
-  /** The step after this one, with the model on the picture where there is but one. */
+  /**
+   * The step after this one, with the model on the picture where there is but one.
+   * @param {Studio.Pattern} pattern
+   */
   onward(pattern) {
     const {models, scenes} = state.project;
     if (models.length === 1 && !scenes.some((scene) => scene.pattern === pattern.name))
       addScene(pattern.name, models[0].name);
   }
 
+  /** @param {PictureVnode} vnode */
   view({attrs: {pattern}}) {
     const score = state.scores.get(pattern.name);
     return m(
@@ -486,7 +581,7 @@ export class Picture {
             score?.failed && finding({...said(score.failed), severity: 'error'}),
             m('div.seen', m(Preview, {
                 pattern,
-                score: this.features && score?.features ? score : null,
+                score: this.features && score && !score.pending && !score.failed ? score : null,
                 handle: (preview) => {
                   this.preview = preview;
                 }

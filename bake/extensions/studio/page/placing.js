@@ -1,9 +1,18 @@
+// @ts-check
 // Places of models on a picture, as numbers: the mathematics of the scene's handles. Matrices are
 // column-major lists of 16. Space of the picture: x right, y up the picture, z towards the viewer;
 // its longer side is 2.
 
+/** @typedef {ArrayLike<number>} Matrix */
+/** @typedef {Studio.Point} Point */
+
 export const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
+/**
+ * @param {Matrix} a
+ * @param {Matrix} b
+ * @returns {number[]}
+ */
 export function multiply(a, b) {
   const product = new Array(16).fill(0);
   for (let column = 0; column < 4; ++column) {
@@ -14,10 +23,14 @@ export function multiply(a, b) {
   return product;
 }
 
+/** @type {(matrix: Matrix, point: Point) => Point} */
 export const transform = (matrix, [x, y, z]) => [0, 1, 2].map(
     (row) => matrix[row] * x + matrix[4 + row] * y + matrix[8 + row] * z + matrix[12 + row]);
 
-/** Of what turns, enlarges alike in all directions and moves. */
+/**
+ * Of what turns, enlarges alike in all directions and moves.
+ * @param {Matrix} matrix
+ */
 export function inverse(matrix) {
   const square = matrix[0] ** 2 + matrix[1] ** 2 + matrix[2] ** 2;
   const turned =
@@ -30,9 +43,14 @@ export function inverse(matrix) {
   ];
 }
 
+/** @param {Point} by */
 export const translation = ([x, y, z]) => [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1];
 
-/** About an axis (0 x, 1 y, 2 z) by degrees. */
+/**
+ * About an axis (0 x, 1 y, 2 z) by degrees.
+ * @param {number} axis
+ * @param {number} degrees
+ */
 export function rotation(axis, degrees) {
   const [cosine, sine] = [Math.cos((degrees * Math.PI) / 180), Math.sin((degrees * Math.PI) / 180)];
   const [b, c] = [(axis + 1) % 3, (axis + 2) % 3];
@@ -43,16 +61,25 @@ export function rotation(axis, degrees) {
   return matrix;
 }
 
+/** @param {number} factor */
 export const scaling = (factor) => [factor, 0, 0, 0, 0, factor, 0, 0, 0, 0, factor, 0, 0, 0, 0, 1];
 
-/** What a matrix does, done about a point. */
+/**
+ * What a matrix does, done about a point.
+ * @type {(point: Point, matrix: Matrix) => number[]}
+ */
 export const about = (point, matrix) =>
     multiply(multiply(translation(point), matrix), translation(point.map((value) => -value)));
 
-/** Degrees about x, y and z, in this order, as a scene's `turn` has them, of a turned matrix. */
+/**
+ * Degrees about x, y and z, in this order, as a scene's `turn` has them, of a turned matrix.
+ * @param {Matrix} matrix
+ */
 export function turnOf(matrix) {
   const scale = Math.hypot(matrix[0], matrix[1], matrix[2]);
+  /** @type {(row: number, column: number) => number} */
   const r = (row, column) => matrix[4 * column + row] / scale;
+  /** @param {number} radians */
   const degrees = (radians) => Number(((radians * 180) / Math.PI).toFixed(2)) + 0;
   const sine = Math.min(1, Math.max(-1, -r(2, 0)));
   if (Math.abs(sine) > 0.999999)
@@ -63,10 +90,14 @@ export function turnOf(matrix) {
   ];
 }
 
+/** @param {Point} turn degrees */
 export const turning = ([x, y, z]) =>
     multiply(rotation(2, z), multiply(rotation(1, y), rotation(0, x)));
 
-/** -180 < degrees <= 180 */
+/**
+ * -180 < degrees <= 180
+ * @param {number} degrees
+ */
 export const wrapped = (degrees) => {
   const turned = ((degrees % 360) + 360) % 360;
   return turned > 180 ? turned - 360 : turned;
@@ -75,6 +106,8 @@ export const wrapped = (degrees) => {
 /**
  * The box of a model that stands: {low, high, middle, foot}. half: its sides' halves, the
  * longest 1.
+ * @param {Matrix} matrix
+ * @param {Point} half
  */
 export function boxOf(matrix, half) {
   const reach = [0, 1, 2].map(
@@ -93,15 +126,23 @@ export function boxOf(matrix, half) {
 // ---- the eye ----
 
 /**
- * An eye: {view: pattern space to eye space, focal and size {width, height} in CSS pixels}.
- * Answers [x, y] from the top left, or null behind it.
+ * Answers the place from the top left, or null behind the eye.
+ * @param {Studio.Eye} eye
+ * @param {Point} point
  */
 export function onScreen({view, focal, size}, point) {
   const [x, y, z] = transform(view, point);
   return z > -1e-6 ? null : [size.width / 2 - (focal * x) / z, size.height / 2 + (focal * y) / z];
 }
 
-/** The line of sight through a place on the screen: {from, along}. */
+/** @typedef {{ from: Point, along: Point }} Sight */
+
+/**
+ * The line of sight through a place on the screen.
+ * @param {Studio.Eye} eye
+ * @param {Point} place
+ * @returns {Sight}
+ */
 export function sight({view, focal, size}, [x, y]) {
   const back = inverse([...view]);
   const from = [back[12], back[13], back[14]];
@@ -109,9 +150,15 @@ export function sight({view, focal, size}, [x, y]) {
   return {from, along: to.map((value, i) => value - from[i])};
 }
 
+/** @type {(a: Point, b: Point) => number} */
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
-/** Where a line of sight meets the plane through a point; null where it runs parallel or away. */
+/**
+ * Where a line of sight meets the plane through a point; null where it runs parallel or away.
+ * @param {Sight} sight
+ * @param {Point} point
+ * @param {Point} normal
+ */
 export function meet({from, along}, point, normal) {
   const slope = dot(along, normal);
   if (Math.abs(slope) < 1e-6) return null;
@@ -119,12 +166,19 @@ export function meet({from, along}, point, normal) {
   return far <= 0 ? null : from.map((value, i) => value + far * along[i]);
 }
 
-/** Whether a place on the screen is in the outline of a box, with this margin in pixels. */
+/**
+ * Whether a place on the screen is in the outline of a box, with this margin in pixels.
+ * @param {Studio.Eye} eye
+ * @param {Studio.Box} box
+ * @param {Point} place
+ */
 export function covers(eye, {low, high}, [x, y], around = 0) {
   const corners = [];
-  for (let i = 0; i < 8; ++i)
-    corners.push(onScreen(eye, [0, 1, 2].map((axis) => ((i >> axis) & 1 ? high : low)[axis])));
-  if (corners.includes(null)) return false;
+  for (let i = 0; i < 8; ++i) {
+    const corner = onScreen(eye, [0, 1, 2].map((axis) => ((i >> axis) & 1 ? high : low)[axis]));
+    if (!corner) return false;
+    corners.push(corner);
+  }
   const hull = hullOf(corners);
   return hull.every(([ax, ay], i) => {
     const [bx, by] = hull[(i + 1) % hull.length];
@@ -133,11 +187,15 @@ export function covers(eye, {low, high}, [x, y], around = 0) {
   });
 }
 
-/** Andrew's monotone chain. */
+/**
+ * Andrew's monotone chain.
+ * @param {Point[]} points
+ */
 function hullOf(points) {
   const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  /** @param {Point[]} list */
   const half = (list) =>
-      list.reduce((chain, point) => {
+      list.reduce((/** @type {Point[]} */ chain, point) => {
             while (chain.length > 1) {
               const [a, b] = chain.slice(-2);
               if ((b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0]) > 0) break;
@@ -159,7 +217,10 @@ const UPRIGHT = {
   '-z': rotation(0, 180)
 };
 
-/** Half the sides of a model's box, the longest 1. */
+/**
+ * Half the sides of a model's box, the longest 1.
+ * @param {Studio.Model | undefined} model
+ */
 export const halfOf = (model) => {
   const most = Math.max(...(model?.size ?? [1, 1, 1]));
   return (model?.size ?? [1, 1, 1]).map((side) => side / most);
@@ -169,6 +230,9 @@ export const halfOf = (model) => {
  * Model to picture, {matrix, scale}, of a scene before its bake is done. What the bake stores is
  * exact; this takes the model's box for the model, by which one that is turned by an odd angle
  * stands a little too high, and is never drawn but relative to itself.
+ * @param {Studio.Scene} scene
+ * @param {Studio.Model | undefined} model
+ * @param {number | null} unit millimetres
  */
 export function placed(scene, model, unit) {
   const turned = multiply(turning(scene.turn), UPRIGHT[scene.up ?? model?.up ?? 'y']);
@@ -176,7 +240,7 @@ export function placed(scene, model, unit) {
   const {kind, value} = scene.size;
   const side = kind === 'height' ? high[2] - low[2] : high[0] - low[0];
   const scale = kind === 'scale' ? value : value / (unit ?? 1) / side;
-  const inUnits = scene.offset.map((each) => (isInMm(scene, unit) ? each / unit : 2 * each));
+  const inUnits = scene.offset.map((each) => (isInMm(scene, unit) ? each / (unit ?? 1) : 2 * each));
   const lift = scene.centred ? 0 : -scale * low[2];
   return {
     scale,
@@ -185,5 +249,9 @@ export function placed(scene, model, unit) {
   };
 }
 
+/**
+ * @param {Studio.Scene} scene
+ * @param {number | null} unit
+ */
 export const isInMm = (scene, unit) =>
     scene.offset_unit === 'mm' || (scene.offset_unit === 'usual' && unit !== null);

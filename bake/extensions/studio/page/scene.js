@@ -1,6 +1,7 @@
+// @ts-check
 // Step 3: models on a picture, moved by drags or numbers, and their texts.
 import {boxOf, halfOf, isInMm, placed, rotation, multiply, turning, turnOf, wrapped} from './placing.js';
-import {button, finding, head, icon, LengthField, name, NumberField, tool} from './parts.js';
+import {button, finding, head, icon, LengthField, name, NumberField, part, tool} from './parts.js';
 import {rail} from './rail.js';
 import {EYES, HANDLES, Stage} from './stage.js';
 import {addScene, deleteScene, modelOf, scenesOf, bundleBytes, setScene, state, tellError} from './state.js';
@@ -9,51 +10,74 @@ import {ModelThumb} from './thumbs.js';
 import {languageName, length, number, said, t} from './words.js';
 
 const m = window.m;
-/** What the bake takes where a scene says nothing: the model's own axis. */
+/** @typedef {{ pattern: Studio.Pattern }} SceneAttributes */
+/** @typedef {import('./parts.js').Shape} Shape */
+/** @typedef {Studio.Wrong & { reason?: string }} Broken */
+/**
+ * What the bake takes where a scene says nothing: the model's own axis.
+ * @type {Studio.Axis[]}
+ */
 const AXES = ['y', 'z', 'x', '-y', '-z', '-x'];
 
 /** Models that a picture on which nothing stands offers as buttons; a list has them all. */
 const MOST_OFFERS = 6;
 
+/** @param {number} value */
 const rounded = (value, digits = 4) => Number(value.toPrecision(digits));
+/** @param {number} value */
 const degrees = (value) => Number(wrapped(value).toFixed(1)) + 0;
 
-/** Keys of modar.toml that a change of a handle sets. */
+/**
+ * Keys of modar.toml that a change of a handle sets.
+ * @param {Studio.Scene} scene
+ * @param {Studio.Change} change
+ * @param {number | null} unit
+ */
 function valuesOf(scene, change, unit) {
-  if (change.move) {
-    const factor = isInMm(scene, unit) ? unit : 0.5;
+  const {move, turn, size} = change;
+  if (move) {
+    const factor = isInMm(scene, unit) ? unit ?? 1 : 0.5;
     return {
       offset: scene.offset.map(
-          (value, i) =>
-              Number((value + change.move[i] * factor).toFixed(factor === unit ? 1 : 4)) + 0)
+          (value, i) => Number((value + move[i] * factor).toFixed(factor === unit ? 1 : 4)) + 0)
     };
   }
-  if (change.size) return sizeValues(scene, scene.size.kind, scene.size.value * change.size);
-  return turnValues(turnOf(multiply(rotation(...change.turn), turning(scene.turn))));
+  if (size) return sizeValues(scene.size.kind, scene.size.value * size);
+  return turn ? turnValues(turnOf(multiply(rotation(...turn), turning(scene.turn)))) : {};
 }
 
+/** @param {Studio.Point} turn */
 const turnValues = (turn) => {
   const [x, y, z] = turn.map(degrees);
   return {turn: x || y ? [x, y, z] : z || null};
 };
 
-const sizeValues = (scene, kind, value) =>
+/** @type {(kind: Studio.Scene['size']['kind'], value: number) => Studio.Values} */
+const sizeValues = (kind, value) =>
     ({[kind]: kind === 'scale' ? rounded(value) : `${rounded(value)}mm`});
 
-/** Attributes: pattern. */
 export class Scene {
-  oninit() {
+  /** @param {Studio.Vnode<SceneAttributes>} vnode */
+  constructor({attrs}) {
+    this.attrs = attrs;
+    this.name = attrs.pattern.name;
+    /** @type {Stage | null} from oncreate() on */
+    this.stage = null;
+    /** @type {string | null} */
     this.selected = null;
     this.tilting = false;
     this.language = state.project.languages[0] ?? document.documentElement.lang;
+    /** @type {Studio.Sized | null} */
     this.picture = null;
     this.loaded = -1;
+    /** @type {Broken | null} */
     this.failure = null;
   }
 
+  /** @param {Studio.Vnode<SceneAttributes>} vnode */
   oncreate({dom, attrs}) {
     this.attrs = attrs;
-    this.stage = new Stage(dom.querySelector('.stage3d'), {
+    this.stage = new Stage(part(dom, '.stage3d', HTMLElement), {
       select: (scene) => this.select(scene.key),
       change: (scene, change) => setScene(scene, (now) => valuesOf(now, change, this.unit)),
       words: (change) => this.wordsOf(change),
@@ -65,34 +89,37 @@ export class Scene {
     this.update();
   }
 
+  /** @param {Studio.Vnode<SceneAttributes>} vnode */
   onupdate({attrs}) {
     this.attrs = attrs;
     this.update();
   }
 
-  onremove() { this.stage.close(); }
+  onremove() { this.stage?.close(); }
 
   /** Updates the stage from the project. */
   update() {
-    if (!this.picture) return;
-    this.stage.show({
+    const {stage, surface} = this;
+    if (!stage || !surface) return;
+    stage.show({
       pattern: this.attrs.pattern,
       scenes: this.scenes(),
       selected: this.selected,
-      surface: this.surface,
+      surface,
       tilting: this.tilting
     });
     const {bundle: baked} = state.project;
     if (!baked.baked || this.loaded === state.baked || baked.stale && this.loaded >= 0) return;
     this.loaded = state.baked;
     const scenes = baked.scenes ?? state.project.scenes.filter(({model}) => model);
-    bundleBytes().then((bytes) => this.stage.load(bytes, scenes)).catch(tellError);
+    bundleBytes().then((bytes) => stage.load(bytes, scenes)).catch(tellError);
   }
 
-  get surface() { return surfaceOf(this.attrs.pattern, this.picture); }
+  get surface() { return this.picture && surfaceOf(this.attrs.pattern, this.picture); }
 
-  get unit() { return this.picture ? this.surface.unit : null; }
+  get unit() { return this.surface?.unit ?? null; }
 
+  /** @returns {Studio.Placed[]} */
   scenes() {
     return scenesOf(this.attrs.pattern.name).map((scene, i) => {
       const asset = modelOf(scene.model);
@@ -106,23 +133,28 @@ export class Scene {
     });
   }
 
+  /** @param {string | null} key */
   select(key) {
     this.selected = key;
     m.redraw();
   }
 
+  /** @param {Studio.Change | null} change */
   wordsOf(change) {
     const {unit} = this;
+    /** @param {number} value */
     const far = (value) =>
         (unit ? length(value * unit) : `${number(Number((50 * value).toFixed(1)))} %`);
     if (!change) return '';
     if (change.size) return `${number(Math.round(100 * change.size))} %`;
     if (change.turn) return `${number(Math.round(change.turn[1]))}°`;
-    return change.move[2] ? far(change.move[2]) : `${far(change.move[0])} · ${far(change.move[1])}`;
+    const [x, y, lift] = change.move ?? [0, 0, 0];
+    return lift ? far(lift) : `${far(x)} · ${far(y)}`;
   }
 
   // ---- the stage ----
 
+  /** @param {Studio.Placed[]} scenes */
   stageView(scenes) {
     return m(
         'section.stage', {'aria-label': t('stage')},
@@ -152,15 +184,17 @@ export class Scene {
                     'aria-label': t(`handle.${kind}`),
                     class: kind
                   },
-                    icon(kind.startsWith('tilt') ? 'turn' : kind))),
+                    icon(kind === 'tilt0' || kind === 'tilt1' ? 'turn' : kind))),
           m('output.tip', {hidden: true})),
         m('div.views.over', {role: 'group', 'aria-label': t('views')},
-          Object.keys(EYES).map(
-              (eye) =>
-                  button(t(`view.${eye}`), () => this.stage.look(eye), {kind: '.quiet.small'}))),
+          /** @type {(keyof typeof EYES)[]} */
+          (Object.keys(EYES)).map((eye) => button(t(`view.${eye}`), () => this.stage?.look(eye), {
+                                    kind: '.quiet.small'
+                                  }))),
         !scenes.length && m('p.hint', t('standFirst')), this.waiting(scenes));
   }
 
+  /** @param {Studio.Placed[]} scenes */
   waiting(scenes) {
     if (this.failure)
       return m('div.hint', finding({
@@ -179,8 +213,10 @@ export class Scene {
 
   // ---- numbers ----
 
+  /** @param {Studio.Placed} scene */
   offsetFields(scene) {
     const inMm = isInMm(scene, this.unit);
+    /** @type {(axis: number) => (value: number) => unknown} */
     const set = (axis) => (value) => setScene(
         scene,
         (now) =>
@@ -205,6 +241,7 @@ export class Scene {
                     })));
   }
 
+  /** @param {Studio.Placed} scene */
   sizeField(scene) {
     const {low, high} = boxOf(scene.matrix, scene.half);
     if (!this.unit) {
@@ -214,7 +251,7 @@ export class Scene {
         value: 100 * scene.size.value,
         unit: '%',
         least: 0.1,
-        onvalue: (value) => setScene(scene, sizeValues(scene, 'scale', value / 100))
+        onvalue: (value) => setScene(scene, sizeValues('scale', value / 100))
       });
     }
     const kind = scene.size.kind === 'width' ? 'width' : 'height';
@@ -224,10 +261,14 @@ export class Scene {
       label: t(kind === 'width' ? 'modelWidth' : 'modelHeight'),
       value: now,
       least: 0.1,
-      onvalue: (mm) => setScene(scene, sizeValues(scene, kind, mm))
+      onvalue: (mm) => setScene(scene, sizeValues(kind, mm))
     });
   }
 
+  /**
+   * @param {Studio.Placed} scene
+   * @param {number} axis
+   */
   turnField(scene, axis) {
     const key = ['tiltX', 'tiltY', 'turn'][axis];
     return m(NumberField, {
@@ -242,6 +283,7 @@ export class Scene {
     });
   }
 
+  /** @param {Studio.Placed} scene */
   upField(scene) {
     const found = scene.asset?.up;
     return m(
@@ -262,6 +304,7 @@ export class Scene {
   /**
    * The axis that is up after one more press: all six in turn, first the one that files mean most
    * often. null: the found one.
+   * @param {Studio.Placed} scene
    */
   nextSide(scene) {
     const found = scene.asset?.up ?? AXES[0];
@@ -270,6 +313,7 @@ export class Scene {
     return next === found ? null : next;
   }
 
+  /** @param {Studio.Placed} scene */
   fields(scene) {
     const tipped = scene.up && scene.up !== scene.asset?.up;
     const leans = tipped || scene.turn[0] !== 0 || scene.turn[1] !== 0;
@@ -301,11 +345,13 @@ export class Scene {
     ];
   }
 
+  /** @param {Studio.Placed} scene */
   words(scene) {
     const languages = [...new Set([
       ...state.project.languages, document.documentElement.lang, 'en', 'de', 'fr', 'es', 'it', 'nl',
       'pl', 'el'
     ])];
+    /** @type {(kind: 'text' | 'alt', label: string, rows: number) => Studio.Drawn} */
     const area = (kind, label, rows) =>
         m('div.field', m('label', { for: kind
           }, label), m('textarea', {
@@ -313,7 +359,7 @@ export class Scene {
             rows,
             dir: 'auto',
             lang: this.language,
-            value: scene[`${kind}s`][this.language] ?? '',
+            value: scene[kind === 'text' ? 'texts' : 'alts'][this.language] ?? '',
             onchange: (event) =>
                 setScene(scene, {[`${kind}.${this.language}`]: event.target.value || null})
           }));
@@ -339,8 +385,10 @@ export class Scene {
 
   // ---- the panel ----
 
+  /** @param {Studio.Placed[]} scenes */
   models(scenes) {
     const all = state.project.models;
+    /** @param {string} chosen */
     const add = (chosen) => addScene(this.name, chosen).then(() => {
       const now = this.scenes();
       this.select(now[now.length - 1]?.key ?? null);
@@ -384,6 +432,7 @@ export class Scene {
                 all.map((model) => m('option', {value: model.name}, model.name)))));
   }
 
+  /** @param {Studio.Vnode<SceneAttributes>} vnode */
   view({attrs}) {
     this.attrs = attrs;
     this.name = attrs.pattern.name;

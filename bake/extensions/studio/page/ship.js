@@ -1,24 +1,32 @@
+// @ts-check
 // Step 5: what the bundle weighs, whether it is good, and the forms in which it leaves this
 // machine.
-import {ask, askJson} from './api.js';
+import {ask, askJson, Refused} from './api.js';
 import {button, finding, head, icon, meter, name, percent} from './parts.js';
 import {isBaking, state, tellError} from './state.js';
 import {bytes, said, sentence, t, told} from './words.js';
 
 const m = window.m;
+/** @typedef {import('./parts.js').Shape} Shape */
+/** @typedef {{ name: string, title: string, fits: boolean, findings: Studio.Finding[] }} Device */
+
 const KINDS = ['page', 'zip', 'apk', 'release'];
 /** Milliseconds between looks at whether the server is still at work. */
 const BUSY_MS = 150;
 /** Parts that are named one by one; the others are one line. */
 const NAMED_PARTS = 6;
 
+/** @param {string} text */
 const whole = (text) => sentence(text) + (/[.!?]$/.test(text) ? '' : '.');
 
 /**
  * What the checker or the bake found, in the page's language where it has the words: see said().
+ * @param {Omit<Studio.Finding, 'severity'>} found
+ * @returns {Studio.Said}
  */
 function issue({id, text: english, cure: remedy, place}) {
   const rule = told(`issue.${id}`, english);
+  /** @type {{ text: string, cure: string, lang?: string, detail?: string }} */
   const {text, cure, ...more} = id.includes('.') ?
       said({code: id, text: english, cure: remedy}) :
       {...rule, cure: told(`issue.${id}.cure`, remedy).text};
@@ -29,13 +37,22 @@ function issue({id, text: english, cure: remedy, place}) {
 const showFolder = () => ask('POST', 'show', {}).catch(tellError);
 
 export class Ship {
-  oninit() {
+  constructor() {
     this.title = state.project.name;
     this.passPhrase = '';
     this.asked = -1;
-    this.check = this.sizes = this.devices = null;
-    /** What cannot be made here, by kind: {text, cure}. */
+    /**
+     * @type {{ good: boolean, errors: number, warnings: number, findings: Studio.Finding[] } |
+     *     null}
+     */
+    this.check = null;
+    /** @type {{ bytes: number, parts: { kind: string, name: string, bytes: number }[] } | null} */
+    this.sizes = null;
+    /** @type {Device[] | null} */
+    this.devices = null;
+    /** @type {Map<string, Studio.Said>} what cannot be made here, by kind */
     this.refused = new Map();
+    /** @type {string | null} */
     this.making = null;
   }
 
@@ -43,15 +60,17 @@ export class Ship {
   async ask() {
     if (this.asked === state.baked || !state.project.bundle.baked) return;
     this.asked = state.baked;
+    /** @param {'check' | 'sizes' | 'devices'} key */
     const each = async (key) => {
       try {
         this[key] = await askJson('GET', key);
       } catch (error) { tellError(error); }
       m.redraw();
     };
-    await Promise.all(['check', 'sizes', 'devices'].map(each));
+    await Promise.all([each('check'), each('sizes'), each('devices')]);
   }
 
+  /** @param {string} kind */
   async make(kind) {
     this.refused.delete(kind);
     state.exported.delete(kind);
@@ -70,16 +89,20 @@ export class Ship {
         await ask('POST', 'export', wish);
         asked = true;
       } catch (error) {
-        if (error.code === 'studio.busy')
+        if (error instanceof Refused && error.code === 'studio.busy')
           await new Promise((done) => {
             setTimeout(done, BUSY_MS);
           });
-        else asked = this.refuse(kind, error);
+        else asked = this.refuse(kind, /** @type {Refused} */ (error));
       }
     }
     m.redraw();
   }
 
+  /**
+   * @param {string} kind
+   * @param {Refused} error
+   */
   refuse(kind, error) {
     this.making = null;
     this.refused.set(kind, {
@@ -116,8 +139,9 @@ export class Ship {
 
   weights() {
     if (!this.sizes) return null;
+    const {bytes: sum} = this.sizes;
     const parts = [...this.sizes.parts].sort((a, b) => b.bytes - a.bytes);
-    const rest = parts.slice(NAMED_PARTS).reduce((sum, part) => sum + part.bytes, 0);
+    const rest = parts.slice(NAMED_PARTS).reduce((all, part) => all + part.bytes, 0);
     const shown =
         [...parts.slice(0, NAMED_PARTS), ...(rest ? [{kind: 'rest', name: '', bytes: rest}] : [])];
     return m(
@@ -130,13 +154,12 @@ export class Ship {
                     m('tr', {key: i},
                       m('th', {scope: 'row'}, t(`part.${part.kind}`),
                         part.name ? [' ', name(part.name)] : ''),
-                      m('td', bytes(part.bytes)),
-                      m('td', m('meter', {
-                          min: 0,
-                          max: 1,
-                          value: part.bytes / this.sizes.bytes,
-                          'aria-label': percent(part.bytes / this.sizes.bytes)
-                        })))))));
+                      m('td', bytes(part.bytes)), m('td', m('meter', {
+                                                      min: 0,
+                                                      max: 1,
+                                                      value: part.bytes / sum,
+                                                      'aria-label': percent(part.bytes / sum)
+                                                    })))))));
   }
 
   phones() {
@@ -145,6 +168,7 @@ export class Ship {
         'section', m('h2', t('devices')),
         m('ul.devices', this.devices.map(({name: device, title, fits, findings}) => {
           const remarks = findings.filter(({severity}) => severity !== 'info');
+          /** @type {[kind: string, shape: Shape, words: string]} */
           const [kind, shape, words] = !fits ? ['fails', 'bad', 'fitsNot'] :
               remarks.length                 ? ['limits', 'warn', 'fitsBut'] :
                                                ['fits', 'check', 'fits'];
@@ -160,6 +184,7 @@ export class Ship {
 
   // ---- how it leaves ----
 
+  /** @param {string} kind */
   way(kind) {
     const done = state.exported.get(kind);
     if (done && this.making === kind) this.making = null;

@@ -1,7 +1,9 @@
+// @ts-check
 // The scene as the device draws it, by the engine that `modar web` ships, and the handles that
 // move its models.
 import {groundTransform, viewFrom} from './engine/turntable.js';
 import {View} from './engine/modar-view.js';
+import {part} from './parts.js';
 import {SurfacePainter} from './surface.js';
 import {about, boxOf, covers, IDENTITY, inverse, meet, multiply, onScreen, placed, rotation, scaling, sight, translation, wrapped} from './placing.js';
 
@@ -39,11 +41,39 @@ const LIFTED = 0.22;
  * pixels.
  */
 const TOO_NEAR_PX = 34;
+/** @typedef {Studio.Point} Point */
+/** @typedef {Studio.Placed} Placed */
+/** @typedef {ReturnType<typeof boxOf>} StandingBox */
+/** @typedef {{ picture: HTMLCanvasElement, models: HTMLCanvasElement }} Layers */
+/** @typedef {StandingBox & Record<Handle, Point> & { around: number, ring: number }} Places */
+/**
+ * What the pointer or the keys hold. apart: of two fingers. delta: what moves the scene meanwhile.
+ * @typedef {object} Drag
+ * @property {Handle | 'orbit' | 'pinch'} kind
+ * @property {Placed | null} scene
+ * @property {StandingBox} box
+ * @property {Studio.Eye} eye
+ * @property {Point} from
+ * @property {Point} last
+ * @property {number} apart
+ * @property {number[]} [delta]
+ * @property {Studio.Change | null} [change]
+ */
+/**
+ * change: {move} in the picture's space, {turn} or {size}.
+ * @typedef {object} Told
+ * @property {(scene: Placed) => void} select
+ * @property {(scene: Placed, change: Studio.Change) => unknown} change
+ * @property {(change: Studio.Change | null) => string} words
+ * @property {(error: Studio.Wrong) => void} failed
+ */
+
 const KEY_STEPS = {
   move: [0.01, 0.05],
   turn: [1, 15],
   size: [1.01, 1.1]
 };
+/** @type {Record<string, Point>} */
 const WAYS = {
   ArrowLeft: [-1, 0],
   ArrowRight: [1, 0],
@@ -51,9 +81,12 @@ const WAYS = {
   ArrowDown: [0, -1]
 };
 
+/** @typedef {'move' | 'lift' | 'turn' | 'size' | 'tilt0' | 'tilt1'} Handle */
+/** @type {Handle[]} */
 export const HANDLES = ['move', 'lift', 'turn', 'size', 'tilt0', 'tilt1'];
 
 const still = () => matchMedia('(prefers-reduced-motion: reduce)').matches;
+/** @type {(a: number[], b: number[]) => boolean} */
 const near = (a, b) => a.every((value, i) => Math.abs(value - b[i]) < 1e-6);
 
 function canvases() {
@@ -64,38 +97,59 @@ function canvases() {
 
 /**
  * dom: a .stage3d with .layers, img.ground, svg.guides and a button[data-handle] a handle.
- * told: {select(scene), change(scene, change), failed(error)}, where a change is {move: [x, y, z]}
- * in the picture's space, {turn: [axis, degrees]} or {size: factor}.
  */
 export class Stage {
+  /** @type {View | null} */
   #view = null;
+  /** @type {Layers | null} */
   #layers = null;
   #loads = 0;
-  /** What draws the next bundle: {layers, give, view}. */
+  /**
+   * What draws the next bundle.
+   * @type {{ layers: Layers, give: (bytes: Uint8Array) => void, view: Promise<View> } | null}
+   */
   #next = null;
   #eye = {...EYES.phone, zoom: 1};
+  /** @type {Point} */
   #target = [0, 0, 0];
   #radius = 1;
   #frame = 0;
+  /** @type {((now: number) => void) | null} */
   #glide = null;
+  /** @type {Map<number, Point>} */
   #pointers = new Map();
+  /** @type {Drag | null} */
   #drag = null;
+  /** @type {Handle | null} */
   #keyed = null;
   #timer = 0;
+  /** @type {Studio.Scene[]} */
   #bakedNow = [];
+  /** @type {import('./surface.js').Surface | null} */
   #ground = null;
   /** Numbers of the scenes that the engine draws one by one, as text, and how many they are. */
   #stood = '';
   #own = 0;
 
+  /**
+   * @param {HTMLElement} dom
+   * @param {Told} told
+   */
   constructor(dom, told) {
     this.dom = dom;
     this.told = told;
+    /** @type {Studio.Pattern | null} */
+    this.pattern = null;
+    /** @type {number | null} */
+    this.unit = null;
+    /** @type {Placed[]} */
     this.scenes = [];
+    /** @type {string | null} */
     this.selected = null;
     this.tilting = false;
     this.surface = new SurfacePainter(
-        dom.querySelector('.body'), dom.querySelector('.ground'), () => this.draw());
+        part(dom, '.body', HTMLCanvasElement), part(dom, '.ground', HTMLImageElement),
+        () => this.draw());
     this.observer = new ResizeObserver(() => this.draw());
     this.observer.observe(dom);
     dom.addEventListener('pointerdown', (event) => this.#press(event));
@@ -122,11 +176,12 @@ export class Stage {
    */
   #prepare() {
     const layers = canvases();
-    this.dom.querySelector('.layers').append(layers.picture, layers.models);
-    layers.models.style.opacity = layers.picture.style.opacity = 0;
-    let give;
+    part(this.dom, '.layers', HTMLElement).append(layers.picture, layers.models);
+    layers.models.style.opacity = layers.picture.style.opacity = '0';
+    /** @type {(bytes: Uint8Array) => void} */
+    let give = () => {};
     const view = View.create(
-        new Promise((done) => {
+        new Promise((/** @type {(bytes: Uint8Array) => void} */ done) => {
           give = done;
         }),
         {...layers, fixedLight: true});
@@ -137,6 +192,8 @@ export class Stage {
   /**
    * A bundle takes the place of the one that is drawn once it can be drawn itself. baked: scenes
    * as it has them, in its order.
+   * @param {Uint8Array} bytes
+   * @param {Studio.Scene[]} baked
    */
   async load(bytes, baked) {
     const load = ++this.#loads;
@@ -155,18 +212,21 @@ export class Stage {
       this.#bakedNow = baked;
       this.#stood = '';
       this.#own = 0;
-      layers.models.style.opacity = 1;
+      layers.models.style.opacity = '1';
       this.draw(true);
       setTimeout(() => {
         if (load === this.#loads) this.#next = this.#prepare();
       });  // once it is seen
     } catch (error) {
       this.#drop(layers);
-      if (load === this.#loads) this.told.failed(error);
+      if (load === this.#loads) this.told.failed(/** @type {Studio.Wrong} */ (error));
     }
   }
 
-  /** Browsers draw with a few contexts at a time: this one is given back now. */
+  /**
+   * Browsers draw with a few contexts at a time: this one is given back now.
+   * @param {Layers | null | undefined} layers
+   */
   #drop(layers) {
     if (!layers) return;
     layers.models.getContext('webgl2')?.getExtension('WEBGL_lose_context')?.loseContext();
@@ -174,20 +234,25 @@ export class Stage {
   }
 
   /**
-   * scenes: the project's, each with {key, asset (the model), half, matrix}. surface: see
-   * surfaceOf().
+   * scenes: the project's.
+   * @param {{ pattern: Studio.Pattern, scenes: Placed[], selected: string | null,
+   *     surface: import('./surface.js').Surface, tilting: boolean }} what
    */
   show({pattern, scenes, selected, surface, tilting}) {
     const first = this.pattern !== pattern || !this.#ground;
     Object.assign(this, {pattern, scenes, selected, tilting, unit: surface.unit});
     this.#ground = surface;
-    if (first || !this.#pointers.size) this.#frameAll(first);
+    if (first || !this.#pointers.size) this.#frameAll(surface, first);
     this.draw();
   }
 
-  /** What the eye goes round: the picture and its models. */
-  #frameAll(at_once) {
-    const boxes = [this.#ground, ...this.scenes.map((scene) => boxOf(scene.matrix, scene.half))];
+  /**
+   * What the eye goes round: the picture and its models.
+   * @param {Studio.Box} ground
+   * @param {boolean} at_once
+   */
+  #frameAll(ground, at_once) {
+    const boxes = [ground, ...this.scenes.map((scene) => boxOf(scene.matrix, scene.half))];
     const low = [0, 1, 2].map((axis) => Math.min(...boxes.map((box) => box.low[axis])));
     const high = [0, 1, 2].map((axis) => Math.max(...boxes.map((box) => box.high[axis])));
     const target = low.map((value, i) => (value + high[i]) / 2);
@@ -199,19 +264,28 @@ export class Stage {
       this.#glideTo({target, radius});
   }
 
+  /** @param {keyof typeof EYES} name */
   look(name) { this.#glideTo({...EYES[name], zoom: 1}); }
 
+  /** @param {number} factor */
   zoom(factor) {
     this.#eye.zoom = Math.min(8, Math.max(0.4, this.#eye.zoom * factor));
     this.draw();
   }
 
+  /**
+   * @param {number} turn
+   * @param {number} tilt
+   */
   orbit(turn, tilt) {
     this.#eye.turn += turn;
     this.#eye.tilt = Math.min(TILTS[1], Math.max(TILTS[0], this.#eye.tilt + tilt));
     this.draw();
   }
 
+  /**
+   * @param {{ turn?: number, tilt?: number, zoom?: number, target?: Point, radius?: number }} aim
+   */
   #glideTo(aim) {
     const from = {...this.#eye, target: this.#target, radius: this.#radius};
     const to = {...from, ...aim};
@@ -219,6 +293,7 @@ export class Stage {
     this.#glide = (now) => {
       const share = still() ? 1 : Math.min(1, (now - began) / GLIDE_MS);
       const eased = 1 - (1 - share) ** 3;
+      /** @type {(a: number, b: number) => number} */
       const between = (a, b) => a + (b - a) * eased;
       this.#eye = {
         turn: between(from.turn, to.turn),
@@ -252,30 +327,38 @@ export class Stage {
     } else this.#frame ||= requestAnimationFrame((time) => this.#paint(time));
   }
 
+  /** @param {number} time */
   #paint(time) {
     this.#frame = 0;
     this.#glide?.(time);
     if (!this.#ground || !this.dom.clientWidth) return;
     const eye = this.eye();
-    this.#paintGround(eye);
+    this.#paintGround(eye, this.#ground);
     this.#paintModels(eye);
     this.#paintHandles(eye);
     this.dom.dataset.drawn = String(Number(this.dom.dataset.drawn ?? 0) + 1);
     if (this.#glide) this.draw();
   }
 
-  #paintGround(eye) {
+  /**
+   * @param {Studio.Eye} eye
+   * @param {import('./surface.js').Surface} ground
+   */
+  #paintGround(eye, ground) {
     const {view, focal, size} = eye;
-    const image = this.dom.querySelector('.ground');
-    image.hidden = this.#ground.faces.length > 0;
-    this.surface.paint(eye, this.#ground);
+    const image = part(this.dom, '.ground', HTMLImageElement);
+    image.hidden = ground.faces.length > 0;
+    this.surface.paint(eye, ground);
     const {naturalWidth: width, naturalHeight: height} = image;
     if (width)
       image.style.transform =
           `matrix3d(${groundTransform(view, focal, size, {width, height}).join()})`;
   }
 
-  /** Where a scene is drawn: under the hand that drags it before the project says so. */
+  /**
+   * Where a scene is drawn: under the hand that drags it before the project says so.
+   * @param {Placed} scene
+   */
   #matrixOf(scene) {
     return this.#drag?.scene?.key === scene.key && this.#drag.delta ?
         multiply(this.#drag.delta, scene.matrix) :
@@ -289,16 +372,17 @@ export class Stage {
   #pairs() {
     const rest = [...this.scenes];
     return this.#bakedNow.map((was, number) => ({was, number}))
-        .filter(({was}) => was.pattern === this.pattern.name)
+        .filter(({was}) => was.pattern === this.pattern?.name)
         .map(({was, number}) => {
           const at = rest.findIndex((scene) => scene.model === was.model);
           return {number, was, now: at < 0 ? null : rest.splice(at, 1)[0]};
         });
   }
 
+  /** @param {Studio.Eye} eye */
   #paintModels({view, focal}) {
-    if (!this.#view) return;
-    const pattern = this.#view.patterns.findIndex(({name}) => name === this.pattern.name);
+    if (!this.#view || !this.#layers) return;
+    const pattern = this.#view.patterns.findIndex(({name}) => name === this.pattern?.name);
     const pairs = this.#pairs();
     this.#layers.models.hidden = pattern < 0 || !pairs.length;
     if (this.#layers.models.hidden) return;
@@ -320,20 +404,26 @@ export class Stage {
       this.#stood = which;
     }
     const base = this.#view.patterns.length - this.#own;
-    this.#view.drawEach(
-        single.flatMap(
-            (pair, i) =>
-                (moved[i] ? [[base + i, Float32Array.from(multiply([...view], moved[i]))]] : [])),
-        focal);
+    /** @type {[number, Float32Array][]} */
+    const views = [];
+    moved.slice(0, single.length).forEach((matrix, i) => {
+      if (matrix) views.push([base + i, Float32Array.from(multiply(view, matrix))]);
+    });
+    this.#view.drawEach(views, focal);
   }
 
   // ---- handles ----
 
-  /** Places of the selection's handles, in the picture's space. */
+  /**
+   * Places of the selection's handles, in the picture's space.
+   * @param {Placed} scene
+   * @returns {Places}
+   */
   #places(scene) {
     const {low, high, foot, middle} = boxOf(this.#matrixOf(scene), scene.half);
     const around = Math.max(high[0] - low[0], high[1] - low[1]) / 2 * 1.25;
-    const spin = this.#drag?.kind === 'turn' ? ((this.#drag.degrees ?? 0) * Math.PI) / 180 : 0;
+    const spin =
+        this.#drag?.kind === 'turn' ? ((this.#drag.change?.turn?.[1] ?? 0) * Math.PI) / 180 : 0;
     const [c, s] = [Math.cos(spin + KNOB), Math.sin(spin + KNOB)];
     const ring = Math.max(around, (high[2] - low[2]) / 2 * 1.2);
     return {
@@ -352,6 +442,12 @@ export class Stage {
     };
   }
 
+  /**
+   * @param {Studio.Eye} eye
+   * @param {Point} middle
+   * @param {number} radius
+   * @param {number} axis
+   */
   #ring(eye, middle, radius, axis) {
     const points = [];
     for (let i = 0; i < 64; ++i) {
@@ -365,21 +461,30 @@ export class Stage {
     return points.length ? `M${points.join('L')}Z` : '';
   }
 
+  /**
+   * @param {Studio.Eye} eye
+   * @param {Point[]} points
+   */
   #line(eye, ...points) {
-    const places = points.map((point) => onScreen(eye, point));
-    return places.includes(null) ?
-        '' :
-        `M${places.map((place) => place.map((value) => value.toFixed(1)).join(' ')).join('L')}`;
+    const places = points.flatMap((point) => {
+      const place = onScreen(eye, point);
+      return place ? [place.map((value) => value.toFixed(1)).join(' ')] : [];
+    });
+    return places.length < points.length ? '' : `M${places.join('L')}`;
   }
 
+  /** @param {Studio.Eye} eye */
   #paintHandles(eye) {
     const scene = this.scenes.find(({key}) => key === this.selected);
+    /** @type {NodeListOf<SVGPathElement>} */
     const paths = this.dom.querySelectorAll('.guides path');
+    /** @type {NodeListOf<HTMLElement>} */
     const buttons = this.dom.querySelectorAll('[data-handle]');
-    const places = scene && this.#places(scene);
-    const [top, foot] = scene ? [onScreen(eye, places.lift), onScreen(eye, places.foot)] : [];
+    const places = scene ? this.#places(scene) : null;
+    const [top, foot] = places ? [onScreen(eye, places.lift), onScreen(eye, places.foot)] : [];
     const flat = top && foot && Math.hypot(top[0] - foot[0], top[1] - foot[1]) < TOO_NEAR_PX;
-    const lines = scene ? {
+    /** @type {Record<string, string>} */
+    const lines = scene && places ? {
       ring: this.#ring(eye, places.foot, places.around, 2),
       stem: this.#line(eye, [places.foot[0], places.foot[1], places.high[2]], places.lift),
       tilt0: this.tilting ? this.#ring(eye, places.middle, places.ring, 0) : '',
@@ -387,11 +492,11 @@ export class Stage {
       box: this.#isDrawn(scene) ? '' : this.#boxLines(eye, places),
       snap: this.#snapLines(eye, places),
     } :
-                          {};
-    for (const path of paths) path.setAttribute('d', lines[path.dataset.line] ?? '');
+                                    {};
+    for (const path of paths) path.setAttribute('d', lines[path.dataset.line ?? ''] ?? '');
     for (const button of buttons) {
-      const kind = button.dataset.handle;
-      const place = scene && (this.tilting || !kind.startsWith('tilt')) &&
+      const kind = /** @type {Handle} */ (button.dataset.handle);
+      const place = places && (this.tilting || !kind.startsWith('tilt')) &&
           !(kind === 'lift' && flat) && onScreen(eye, places[kind]);
       button.hidden = !place;
       if (place) Object.assign(button.style, {left: `${place[0]}px`, top: `${place[1]}px`});
@@ -399,12 +504,19 @@ export class Stage {
     this.#say(eye, places);
   }
 
+  /** @param {Placed} scene */
   #isDrawn(scene) {
     return this.#view !== null && this.#pairs().some(({now}) => now?.key === scene.key);
   }
 
+  /**
+   * @param {Studio.Eye} eye
+   * @param {Studio.Box} box
+   */
   #boxLines(eye, {low, high}) {
+    /** @type {(x: number, y: number, z: number) => Point} */
     const corner = (x, y, z) => [x ? high[0] : low[0], y ? high[1] : low[1], z ? high[2] : low[2]];
+    /** @param {number} z */
     const ring = (z) => this.#line(
         eye, corner(0, 0, z), corner(1, 0, z), corner(1, 1, z), corner(0, 1, z), corner(0, 0, z));
     return [
@@ -414,18 +526,26 @@ export class Stage {
     ].join('');
   }
 
+  /**
+   * @param {Studio.Eye} eye
+   * @param {Places} places
+   */
   #snapLines(eye, {foot}) {
     if (this.#drag?.kind !== 'move' || !this.#drag.delta) return '';
     return (Math.abs(foot[0]) < 1e-6 ? this.#line(eye, [0, -1, 0], [0, 1, 0]) : '') +
         (Math.abs(foot[1]) < 1e-6 ? this.#line(eye, [-1, 0, 0], [1, 0, 0]) : '');
   }
 
-  /** The size of the move, shown next to it. */
+  /**
+   * The size of the move, shown next to it.
+   * @param {Studio.Eye} eye
+   * @param {Places | null} places
+   */
   #say(eye, places) {
-    const tip = this.dom.querySelector('.tip');
-    const text = this.#drag?.delta && this.told.words(this.#drag.change);
+    const tip = part(this.dom, '.tip', HTMLElement);
+    const text = this.#drag?.delta && this.told.words(this.#drag.change ?? null);
     tip.hidden = !text || !places;
-    if (tip.hidden) return;
+    if (!text || !places) return;
     tip.textContent = text;
     const place = onScreen(eye, places.lift) ?? [0, 0];
     Object.assign(tip.style, {left: `${place[0]}px`, top: `${place[1] - 34}px`});
@@ -433,12 +553,17 @@ export class Stage {
 
   // ---- the pointer ----
 
+  /** @param {PointerEvent} event */
   #place(event) {
     const {left, top} = this.dom.getBoundingClientRect();
     return [event.clientX - left, event.clientY - top];
   }
 
-  /** The nearest model under a place. */
+  /**
+   * The nearest model under a place.
+   * @param {Studio.Eye} eye
+   * @param {Point} place
+   */
   #under(eye, place) {
     const {from} = sight(eye, place);
     const hit = this.scenes.map((scene) => ({scene, box: boxOf(scene.matrix, scene.half)}))
@@ -450,37 +575,46 @@ export class Stage {
         null;
   }
 
+  /** @param {PointerEvent} event */
   #hover(event) {
     if (this.#pointers.size || event.pointerType === 'touch') return;
     this.dom.style.cursor = this.#under(this.eye(), this.#place(event)) ? 'move' : 'grab';
   }
 
+  /**
+   * @param {Drag['kind']} kind
+   * @param {Placed | null} scene
+   * @param {Point} place
+   * @returns {Drag}
+   */
+  #held(kind, scene, place) {
+    const box = scene ? boxOf(scene.matrix, scene.half) : boxOf(IDENTITY, [0, 0, 0]);
+    return {kind, scene, box, eye: this.eye(), from: place, last: place, apart: 1};
+  }
+
+  /** @param {PointerEvent} event */
   #press(event) {
-    if (event.button !== 0 || event.target.closest('.over')) return;
+    const target = /** @type {HTMLElement} */ (event.target);
+    if (event.button !== 0 || target.closest('.over')) return;
     this.#glide = null;
     this.#pointers.set(event.pointerId, this.#place(event));
     this.dom.setPointerCapture(event.pointerId);
     this.dom.onpointermove = (move) => this.#move(move);
     this.dom.onpointerup = this.dom.onpointercancel = (up) => this.#release(up);
     if (this.#pointers.size > 1) {
-      this.#drag = {kind: 'pinch', apart: this.#apart()};
+      this.#drag = {...this.#held('pinch', null, this.#place(event)), apart: this.#apart()};
       return;
     }
-    const handle = event.target.closest('[data-handle]');
+    /** @type {HTMLElement | null} */
+    const handle = target.closest('[data-handle]');
     const eye = this.eye();
     const place = this.#place(event);
     if (handle) handle.focus({preventScroll: true});
     const scene =
         handle ? this.scenes.find(({key}) => key === this.selected) : this.#under(eye, place);
     if (scene && scene.key !== this.selected) this.told.select(scene);
-    this.#drag = {
-      kind: scene ? handle?.dataset.handle ?? 'move' : 'orbit',
-      scene,
-      eye,
-      from: place,
-      last: place,
-      box: scene && boxOf(scene.matrix, scene.half)
-    };
+    const kind = /** @type {Handle | undefined} */ (handle?.dataset.handle) ?? 'move';
+    this.#drag = this.#held(scene ? kind : 'orbit', scene ?? null, place);
     event.preventDefault();
   }
 
@@ -489,64 +623,80 @@ export class Stage {
     return Math.hypot(a[0] - b[0], a[1] - b[1]);
   }
 
+  /** @param {PointerEvent} event */
   #move(event) {
-    if (!this.#pointers.has(event.pointerId)) return;
+    const drag = this.#drag;
+    if (!drag || !this.#pointers.has(event.pointerId)) return;
     const place = this.#place(event);
     this.#pointers.set(event.pointerId, place);
-    const {kind, last} = this.#drag;
+    const {kind, last} = drag;
     if (kind === 'pinch') {
+      if (this.#pointers.size < 2) return;  // one finger has left
       const apart = this.#apart();
-      this.zoom(apart / this.#drag.apart);
-      this.#drag.apart = apart;
+      this.zoom(apart / drag.apart);
+      drag.apart = apart;
     } else if (kind === 'orbit') {
       this.orbit(-(place[0] - last[0]) / 160, (place[1] - last[1]) / 160);
     } else {
-      this.#set(this.#changeTo(place, event.altKey));
+      this.#set(drag, this.#changeTo(drag, place, event.altKey));
     }
-    this.#drag.last = place;
+    drag.last = place;
   }
 
+  /** @param {PointerEvent} event */
   #release(event) {
     this.#pointers.delete(event.pointerId);
     if (this.#pointers.size) return;
     this.dom.onpointermove = this.dom.onpointerup = this.dom.onpointercancel = null;
     const drag = this.#drag;
     if (event.type === 'pointercancel' || !drag?.delta) this.#drag = null;
-    else this.#commit();
+    else this.#commit(drag);
     this.draw();
   }
 
-  /** A dragged model stays in place until the project has it. */
-  #commit() {
-    const {scene, change} = this.#drag;
-    const done = this.told.change(scene, change);
-    const drag = this.#drag;
+  /**
+   * A dragged model stays in place until the project has it.
+   * @param {Drag} drag
+   */
+  #commit(drag) {
+    const {scene, change} = drag;
+    const done = scene && change && this.told.change(scene, change);
     Promise.resolve(done).finally(() => {
       if (this.#drag === drag) this.#drag = null;
       this.draw();
     });
   }
 
-  /** change: see the class; its matrix moves the scene meanwhile. */
-  #set(change) {
+  /**
+   * The change's matrix moves the scene meanwhile.
+   * @param {Drag} drag
+   * @param {Studio.Change | null} change
+   */
+  #set(drag, change) {
     if (!change) return;
-    const {box} = this.#drag;
-    this.#drag.change = change;
-    this.#drag.degrees = change.turn?.[1];
-    this.#drag.delta = change.move ?
+    const {box} = drag;
+    drag.change = change;
+    drag.delta = change.move ?
         translation(change.move) :
         change.turn ?
         about(change.turn[0] === 2 ? box.foot : box.middle, rotation(...change.turn)) :
-        about(box.foot, scaling(change.size));
+        about(box.foot, scaling(change.size ?? 1));
     this.draw(true);
   }
 
-  #changeTo(place, free) {
-    const {kind, eye, from, box} = this.#drag;
+  /**
+   * @param {Drag} drag
+   * @param {Point} place
+   * @param {boolean} free it does not snap
+   * @returns {Studio.Change | null}
+   */
+  #changeTo(drag, place, free) {
+    const {kind, eye, from, box} = drag;
     const now = sight(eye, place);
     const then = sight(eye, from);
     if (kind === 'move')
-      return this.#moveTo(meet(then, box.foot, [0, 0, 1]), meet(now, box.foot, [0, 0, 1]), free);
+      return this.#moveTo(
+          drag, meet(then, box.foot, [0, 0, 1]), meet(now, box.foot, [0, 0, 1]), free);
     if (kind === 'lift') {
       const facing = [now.along[0], now.along[1], 0];
       const [a, b] = [meet(then, box.middle, facing), meet(now, box.middle, facing)];
@@ -557,6 +707,7 @@ export class Stage {
     }
     if (kind === 'size') {
       const foot = onScreen(eye, box.foot);
+      if (!foot) return null;
       const [a, b] = [from, place].map((each) => Math.hypot(each[0] - foot[0], each[1] - foot[1]));
       return {size: Math.max(0.02, b / Math.max(a, 1))};
     }
@@ -564,15 +715,24 @@ export class Stage {
     return this.#turnTo(eye, from, place, axis, axis === 2 ? box.foot : box.middle, free);
   }
 
-  /** Pixels in a unit of the picture's space, there. */
+  /**
+   * Pixels in a unit of the picture's space, there.
+   * @param {Studio.Eye} eye
+   * @param {Point} point
+   */
   #pixels(eye, point) {
     const back = inverse([...eye.view]);
     return eye.focal / Math.hypot(...[12, 13, 14].map((at, i) => back[at] - point[i]));
   }
 
-  #moveTo(a, b, free) {
+  /**
+   * @param {Drag} drag
+   * @param {Point | null} a
+   * @param {Point | null} b
+   * @param {boolean} free
+   */
+  #moveTo({box, eye}, a, b, free) {
     if (!a || !b) return null;
-    const {box, eye} = this.#drag;
     const to = [0, 1].map((axis) => {
       const moved = b[axis] - a[axis];
       const middle =
@@ -582,11 +742,21 @@ export class Stage {
     return {move: [...to, 0]};
   }
 
+  /**
+   * @param {Studio.Eye} eye
+   * @param {Point} from
+   * @param {Point} place
+   * @param {number} axis
+   * @param {Point} middle
+   * @param {boolean} free
+   * @returns {Studio.Change}
+   */
   #turnTo(eye, from, place, axis, middle, free) {
     const normal = [0, 1, 2].map((each) => (each === axis ? 1 : 0));
     const [a, b] = [from, place].map((each) => meet(sight(eye, each), middle, normal));
     let degrees;
     if (a && b) {
+      /** @param {Point} point */
       const angle = (point) => Math.atan2(
           point[(axis + 2) % 3] - middle[(axis + 2) % 3],
           point[(axis + 1) % 3] - middle[(axis + 1) % 3]);
@@ -598,8 +768,11 @@ export class Stage {
 
   // ---- keys ----
 
+  /** @param {KeyboardEvent} event */
   #key(event) {
-    const handle = event.target.closest('[data-handle]')?.dataset.handle;
+    /** @type {HTMLElement | null} */
+    const button = /** @type {HTMLElement} */ (event.target).closest('[data-handle]');
+    const handle = /** @type {Handle | undefined} */ (button?.dataset.handle);
     const way = WAYS[event.key];
     if (event.key === '+' || event.key === '-') this.zoom(event.key === '+' ? 1.15 : 1 / 1.15);
     if (!way) return;
@@ -609,30 +782,39 @@ export class Stage {
       return;
     }
     const scene = this.scenes.find(({key}) => key === this.selected);
-    if (this.#drag?.kind !== handle || !this.#keyed)
-      this.#drag = {kind: handle, scene, box: boxOf(scene.matrix, scene.half), change: null};
+    if (!scene) return;
+    const drag =
+        this.#drag?.kind === handle && this.#keyed ? this.#drag : this.#held(handle, scene, [0, 0]);
+    this.#drag = drag;
     this.#keyed = handle;
     clearTimeout(this.#timer);
     this.#timer = setTimeout(() => this.#restKeys(), KEYS_REST_MS);
-    this.#set(this.#keyChange(handle, way, event.shiftKey ? 1 : 0, this.#drag.change));
+    this.#set(drag, this.#keyChange(handle, way, event.shiftKey ? 1 : 0, drag.change));
   }
 
-  /** What one more press of an arrow key makes of a change. */
+  /**
+   * What one more press of an arrow key makes of a change.
+   * @param {Handle} handle
+   * @param {Point} way
+   * @param {number} fast
+   * @param {Studio.Change | null | undefined} before
+   * @returns {Studio.Change}
+   */
   #keyChange(handle, [x, y], fast, before) {
     if (handle === 'move' || handle === 'lift') {
       const step = this.unit ? (fast ? 10 : 1) / this.unit : KEY_STEPS.move[fast];
       const by = handle === 'move' ? [x, y, 0] : [0, 0, x + y];
-      return {move: by.map((each, i) => (before?.move[i] ?? 0) + step * each)};
+      return {move: by.map((each, i) => (before?.move?.[i] ?? 0) + step * each)};
     }
     if (handle === 'size') return {size: (before?.size ?? 1) * KEY_STEPS.size[fast] ** (x + y)};
     const axis = handle === 'turn' ? 2 : Number(handle.slice(-1));
-    return {turn: [axis, (before?.turn[1] ?? 0) + KEY_STEPS.turn[fast] * (x + y)]};
+    return {turn: [axis, (before?.turn?.[1] ?? 0) + KEY_STEPS.turn[fast] * (x + y)]};
   }
 
   #restKeys() {
     clearTimeout(this.#timer);
     if (!this.#keyed) return;
     this.#keyed = null;
-    if (this.#drag?.change) this.#commit();
+    if (this.#drag?.change) this.#commit(this.#drag);
   }
 }

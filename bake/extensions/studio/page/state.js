@@ -1,3 +1,4 @@
+// @ts-check
 // The project as the server has it, and every change of it: one place, so that undo, the file on
 // disk and the view agree.
 import {ask, askJson, pathOf, Refused} from './api.js';
@@ -13,27 +14,34 @@ const BAKE_AFTER_MS = {
   byHand: 50
 };
 
+/** @typedef {keyof typeof BAKE_AFTER_MS} Where */
+/** @typedef {Studio.Edit | ((now: Studio.Project) => Studio.Edit[])} Wish */
+/** @typedef {Studio.Score & { pending?: undefined, failed?: undefined }} Known */
+/** @typedef {{ pending: true, failed?: undefined }} Asked */
+/** @typedef {{ pending?: undefined, failed: Studio.Wrong }} Failed */
+/** @typedef {{ found?: Studio.Rival[], pending?: boolean }} Rivals */
+
 export const state = {
-  project: null,
-  /** The work that runs: {kind, stage, done (0 to 1), eta_s}; null: none. */
+  /** @type {Studio.Project} the page draws none of it before load() */
+  project: /** @type {never} */ (null),
+  /** @type {{ kind: string, stage: string, done: number, eta_s?: number } | null} 0 to 1 */
   progress: null,
-  /** Why the last bake or export failed: {kind, error, cure}. */
+  /** @type {Studio.Failure | null} why the last bake or export failed */
   failure: null,
   /** Counts bakes: the stage loads the bundle anew. */
   baked: 0,
-  /** Answers of api/score by pattern. */
+  /** @type {Map<string, Known | Asked | Failed>} answers of api/score by pattern */
   scores: new Map(),
-  /**
-     What each pattern is taken for, by pattern: {found: [{pattern, times, views}]}, or {pending}.
-   */
+  /** @type {Map<string, Rivals>} what each pattern is taken for */
   rivals: new Map(),
-  /** The last exports by kind: {path, url}. */
+  /** @type {Map<string, { path: string, url?: string }>} the last exports by kind */
   exported: new Map(),
   gone: false,
-  /** Messages that go away: {text, cure, bad}. */
+  /** @type {(Studio.Said & { bad: boolean }) | null} a message that goes away */
   notice: null,
 };
 
+/** @type {Promise<unknown>} */
 let queue = Promise.resolve();
 let bakeTimer = 0;
 /** The person has cancelled: nothing is baked until something changes. */
@@ -41,21 +49,40 @@ let halted = false;
 
 const redraw = () => window.m.redraw();
 
+/** @param {unknown} error */
+export const isGone = (error) => error instanceof Refused && error.status === 0;
+/**
+ * The file on disk, or the server's work, is not what the request takes it for.
+ * @param {unknown} error
+ */
+const isConflict = (error) => error instanceof Refused && error.status === 409;
+
+/**
+ * @param {Studio.Child} text
+ * @param {{ cure?: Studio.Child, detail?: string, bad?: boolean }} more
+ */
 export function tell(text, {cure = '', detail = '', bad = false} = {}) {
   state.notice = {text, cure, detail, bad};
   redraw();
 }
 
-/** An error in words. A request that the page itself gave up reports nothing. */
+/**
+ * An error in words. A request that the page itself gave up reports nothing.
+ * @param {unknown} error
+ */
 export function tellError(error) {
-  if (error.name === 'AbortError') return;
+  if (error instanceof Error && error.name === 'AbortError') return;
+  const words = said(/** @type {Studio.Wrong} */ (error));
   if (error instanceof Refused && error.status === 0) state.gone = true;
-  else tell(said(error).text, {...said(error), bad: true});
+  else tell(words.text, {...words, bad: true});
   redraw();
 }
 
+/** @param {string} name */
 export const patternOf = (name) => state.project?.patterns.find((pattern) => pattern.name === name);
+/** @param {string} name */
 export const modelOf = (name) => state.project?.models.find((model) => model.name === name);
+/** @param {string} pattern */
 export const scenesOf = (pattern) =>
     state.project?.scenes.filter((scene) => scene.pattern === pattern && scene.model) ?? [];
 export const missingFiles = () =>
@@ -64,7 +91,10 @@ export const missingFiles = () =>
 /** Nodes that must be visible to have a place: a model that has all its files, on a picture. */
 export const isBakeable = () => (state.project?.scenes.length ?? 0) > 0;
 
-/** What a picture's grade follows from. */
+/**
+ * What a picture's grade follows from.
+ * @param {Studio.Pattern} pattern
+ */
 const lookOf = ({
   file,
   corners,
@@ -77,9 +107,15 @@ const lookOf = ({
   box_mm: box
 }) => JSON.stringify([file, corners, width, height, kind, arc, top, bottom, box]);
 
+/**
+ * @param {Studio.Project} project
+ * @param {Where} where
+ */
 function take(project, where = 'here') {
+  /** @type {Studio.Project | null} */
   const before = state.project;
   state.project = project;
+  /** @param {Studio.Pattern[]} patterns */
   const looks = (patterns = []) =>
       JSON.stringify(patterns.map(({name, file, corners}) => [name, file, corners]));
   if (looks(before?.patterns) !== looks(project.patterns)) state.rivals.clear();
@@ -94,20 +130,32 @@ function take(project, where = 'here') {
 
 export async function load() { take(await askJson('GET', 'project'), 'byHand'); }
 
-/** Changes wait for one another: each names the revision that the one before has made. */
+/**
+ * Changes wait for one another: each names the revision that the one before has made.
+ * @template Done
+ * @param {() => Promise<Done>} work
+ */
 function queued(work) {
   const done = queue.then(work);
   queue = done.catch(() => {});
   return done;
 }
 
-const sameScene = (before, after, each) => each.table !== 'scene' || each.index === undefined || [
-  'pattern', 'model'
-].every((key) => before.scenes[each.index]?.[key] === after.scenes[each.index]?.[key]);
+/**
+ * @param {Studio.Project} before
+ * @param {Studio.Project} after
+ * @param {Wish} each
+ */
+function sameScene(before, after, each) {
+  if (typeof each === 'function' || each.table !== 'scene' || each.index === undefined) return true;
+  const [was, now] = [before.scenes[each.index], after.scenes[each.index]];
+  return was?.pattern === now?.pattern && was?.model === now?.model;
+}
 
 /**
  * Several edits are one step of undo; a function answers those that a project needs. Where the file
  * has changed meanwhile, they are made again if they still mean the same.
+ * @param {Wish[]} wanted
  */
 export function edit(...wanted) {
   const send = () => {
@@ -122,7 +170,7 @@ export function edit(...wanted) {
            try {
              take(await send());
            } catch (error) {
-             if (error.status !== 409) throw error;
+             if (!isConflict(error)) throw error;
              await load();
              if (!wanted.every((each) => sameScene(before, state.project, each))) throw error;
              take(await send());
@@ -131,29 +179,53 @@ export function edit(...wanted) {
       .catch(tellError);
 }
 
-/** Keys of a table as modar.toml has them; null takes one out. */
+/**
+ * Keys of a table as modar.toml has them; null takes one out.
+ * @param {Studio.Edit} which
+ * @param {Studio.Values} values
+ * @returns {Studio.Edit[]}
+ */
 const changes = (which, values) => Object.entries(values).map(
     ([key, value]) =>
         (value === null ? {op: 'remove', ...which, key} : {op: 'set', ...which, key, value}));
 
-/** A scene that modar.toml does not name, but has by the names of its files, has no index. */
+/**
+ * A scene that modar.toml does not name, but has by the names of its files, has no index.
+ * @param {Studio.Scene} scene
+ */
 const whichScene = ({index, pattern, model}) =>
     ({table: 'scene', ...(index === null ? {pattern, model} : {index})});
 
 /**
  * values: keys, or a function that answers them for the scene of the moment when its turn comes:
  * changes add up, however fast they follow.
+ * @param {Studio.Scene} scene
+ * @param {Studio.Values | ((now: Studio.Scene) => Studio.Values)} values
  */
 export const setScene = (scene, values) => edit((project) => {
+  /** @param {Studio.Scene} each */
   const same = (each) => each.pattern === scene.pattern && each.model === scene.model;
   const now = project.scenes.find((each) => same(each) && each.index === scene.index) ??
       project.scenes.find(same);
   return now ? changes(whichScene(now), typeof values === 'function' ? values(now) : values) : [];
 });
+/**
+ * @param {string} name
+ * @param {Studio.Values} values
+ */
 export const setPattern = (name, values) => edit(...changes({table: 'pattern', name}, values));
+/**
+ * @param {string} pattern
+ * @param {string} model
+ */
 export const addScene = (pattern, model) =>
     edit({op: 'add', table: 'scene', value: {pattern, model}});
+/** @param {Studio.Scene} scene */
 export const deleteScene = (scene) => edit({op: 'delete', ...whichScene(scene)});
+/**
+ * @param {'model' | 'pattern'} table
+ * @param {string} name
+ */
 export const deleteAsset = (table, name) => edit({op: 'delete', table, name});
 export const begin = () =>
     queued(async () => take(await askJson('POST', 'init', {}))).catch(tellError);
@@ -166,8 +238,13 @@ export const redo = () =>
 /** Bytes that the server takes of a file, see kMostUploadBytes of server.cpp. */
 const MOST_BYTES = 2 ** 31;
 
-/** Sends files one after the other: {name, blob}. Answers what the server said of each. */
+/**
+ * Sends files one after the other. Answers what the server said of each.
+ * @param {Studio.Sent[]} files
+ * @param {(done: number, total: number, file: string) => void} onProgress
+ */
 export async function addFiles(files, onProgress) {
+  /** @type {{ name: string, added?: string[], problems?: Studio.Wrong[] }[]} */
   const told = [];
   for (const [i, {name, blob}] of files.entries()) {
     onProgress(i, files.length, name);
@@ -182,8 +259,8 @@ export async function addFiles(files, onProgress) {
       const answer = await queued(() => askJson('PUT', `files/${pathOf(name)}`, blob));
       told.push({name, ...answer});
     } catch (error) {
-      if (error.status === 0) throw error;
-      told.push({name, problems: [error]});
+      if (isGone(error)) throw error;
+      told.push({name, problems: [/** @type {Studio.Wrong} */ (error)]});
     }
   }
   onProgress(files.length, files.length, '');
@@ -194,6 +271,7 @@ export async function addFiles(files, onProgress) {
 /**
  * A running job is ended if its result is no longer wanted, and waited for if it is another one
  * or if files have changed meanwhile, which may be unrelated: it ends with an event.
+ * @param {Where} where
  */
 async function bake(where) {
   try {
@@ -206,10 +284,11 @@ async function bake(where) {
     }
   } catch (error) {
     state.progress = null;
-    if (error.status !== 409) tellError(error);
+    if (!isConflict(error)) tellError(error);
   }
 }
 
+/** @param {Where} where */
 function bakeSoon(where) {
   clearTimeout(bakeTimer);
   bakeTimer = setTimeout(() => {
@@ -221,7 +300,10 @@ function bakeSoon(where) {
 /** Whether a bake runs, or is about to. */
 export const isBaking = () => bakeTimer !== 0 || state.progress?.kind === 'bake';
 
-/** A bake that read a file while it was written is made again. */
+/**
+ * A bake that read a file while it was written is made again.
+ * @param {Studio.Failure | null} failure
+ */
 const lasting = (failure) => (failure?.code === 'project.changing' ? null : failure);
 
 /**
@@ -239,17 +321,21 @@ export async function cancel() {
   await ask('DELETE', 'job').catch(tellError);
 }
 
+/** @param {string} name */
 export async function loadScore(name) {
   if (state.scores.get(name)?.pending) return;
   state.scores.set(name, {pending: true});
   try {
     const score = await askJson('GET', `score?pattern=${encodeURIComponent(name)}`);
     state.scores.set(name, score);
-  } catch (error) { state.scores.set(name, {failed: error}); }
+  } catch (error) { state.scores.set(name, {failed: /** @type {Studio.Wrong} */ (error)}); }
   redraw();
 }
 
-/** What a phone may take a picture for, of the project's others. */
+/**
+ * What a phone may take a picture for, of the project's others.
+ * @param {string} name
+ */
 export async function loadRivals(name) {
   if (state.rivals.has(name)) return;
   if (state.project.patterns.length < 2) {
@@ -265,7 +351,10 @@ export async function loadRivals(name) {
   redraw();
 }
 
-/** The bundle that was baked last, once for all that draws it: {baked, bytes}. */
+/**
+ * The bundle that was baked last, once for all that draws it.
+ * @type {{ baked: number, bytes: Promise<Uint8Array> } | null}
+ */
 let bundle = null;
 
 export function bundleBytes() {
@@ -283,21 +372,28 @@ export function bundleBytes() {
 /** What happens on the server, as it happens. */
 export function listen() {
   const events = new EventSource('api/events');
-  const on = (type, act) => events.addEventListener(type, ({data}) => {
+  /**
+   * @template Told
+   * @param {string} type
+   * @param {(told: Told) => void} act
+   */
+  const on = (type, act) => events.addEventListener(type, (event) => {
+    const {data} = /** @type {MessageEvent<string | undefined>} */ (event);
     act(data ? JSON.parse(data) : {});
     redraw();
   });
-  on('progress', (progress) => {
+  on('progress', (/** @type {typeof state.progress} */ progress) => {
     state.progress = progress;
   });
-  on('project', ({revision, files = false}) => {
+  /** @typedef {{ revision?: string, files?: boolean }} ProjectTold */
+  on('project', (/** @type {ProjectTold} */ {revision, files = false}) => {
     if (files || revision !== state.project?.revision) follow();
   });
-  on('baked', ({findings = [], errors = []}) => {
+  /** @typedef {{ errors?: Studio.Wrong[] }} BakedTold */
+  on('baked', (/** @type {BakedTold} */ {errors = []}) => {
     Object.assign(state, {
       progress: null,
-      failure: lasting(errors.length ? {kind: 'bake', ...errors[0], errors} : null),
-      findings
+      failure: lasting(errors.length ? {kind: 'bake', ...errors[0], errors} : null)
     });
     ++state.baked;
     queued(load).catch(tellError);
@@ -306,7 +402,7 @@ export function listen() {
     ++state.baked;
     queued(load).catch(tellError);
   });
-  on('failed', (failure) => {
+  on('failed', (/** @type {Studio.Failure} */ failure) => {
     Object.assign(state, {progress: null, failure: lasting(failure)});
     if (!state.failure) queued(load).catch(tellError);
   });
@@ -314,13 +410,11 @@ export function listen() {
     state.progress = null;
     queued(load).catch(tellError);
   });
-  on('exported', ({kind, path, url}) => {
+  /** @typedef {{ kind: string, path: string, url?: string }} Exported */
+  on('exported', (/** @type {Exported} */ {kind, path, url}) => {
     state.progress = null;
     state.exported.set(kind, {path, url});
     queued(load).catch(tellError);  // what has changed meanwhile is baked now
-  });
-  on('phone', ({url}) => {
-    state.phone = url;
   });
   events.onerror = () => {
     state.gone = true;

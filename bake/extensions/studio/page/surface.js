@@ -1,3 +1,4 @@
+// @ts-check
 // The surface of a picture that is not flat: a label, a cup or a box, in the space that the
 // bundle's record gives it (formats/bundle.md).
 import {thumb} from './api.js';
@@ -19,55 +20,87 @@ const SEAM_PX = 0.7;
 /** Share of a cell's picture that is drawn beyond its edges, for the same. */
 const OVERLAP = 0.1;
 
-const around = ({top_mm: top, bottom_mm: bottom}) => (Math.PI * (top + (bottom || top))) / 2;
+/** @typedef {Studio.Point} Point */
+/** @typedef {{ top_mm?: number | null, bottom_mm?: number | null }} Diameters */
+/**
+ * picture: '' is the pattern's own, undefined is plain. at: the place of a share of its width and
+ * height.
+ * @typedef {object} Face
+ * @property {string} [picture]
+ * @property {number[]} cells
+ * @property {(s: number, t: number) => Point} at
+ */
+/**
+ * unit: millimetres in a unit of the picture's space; null: not known. Flat ones have no faces.
+ * @typedef {Studio.Box & { unit: number | null, faces: Face[], caps: Point[][] }} Surface
+ */
+
+/** @param {Diameters} pattern */
+const around = ({top_mm: top, bottom_mm: bottom}) =>
+    (Math.PI * ((top ?? 0) + (bottom || (top ?? 0)))) / 2;
+/** @param {Studio.Pattern} pattern */
 const isRound = ({kind}) => kind === 'cylinder' || kind === 'cone';
 
-/** The width of a pattern's picture along its surface, millimetres; null: not known. */
+/**
+ * The width of a pattern's picture along its surface, millimetres; null: not known.
+ * @param {Studio.Pattern} pattern
+ */
 export const widthOf = (pattern) => pattern.width_mm ??
     (isRound(pattern) && pattern.arc_deg ? (around(pattern) * pattern.arc_deg) / 360 : null);
 
-/** Degrees that a picture covers which is so wide along a surface of these diameters. */
+/**
+ * Degrees that a picture covers which is so wide along a surface of these diameters.
+ * @type {(pattern: Diameters, along: number) => number}
+ */
 export const arcOf = (pattern, along) => Math.min(360, (360 * along) / around(pattern));
+/** @type {(pattern: Diameters, arc: number) => number} */
 export const alongOf = (pattern, arc) => (around(pattern) * arc) / 360;
 
 /**
- * Sides of a box, as the bake joins their pictures: {side, corner, right, down}, millimetres about
+ * Sides of a box, as the bake joins their pictures: {corner, right, down}, millimetres about
  * the middle of the front.
+ * @param {Studio.Pattern} pattern
+ * @param {Point} size
  */
-function boxFaces({box_mm: [w, h, d], sides, file}) {
+function boxFaces({sides, file}, [w, h, d]) {
   const [x, y] = [w / 2, h / 2];
-  return [
+  /** @type {[Studio.Side | null, Point, Point, Point][]} */
+  const faces = [
     [null, [-x, y, 0], [w, 0, 0], [0, -h, 0]],
     ['right', [x, y, 0], [0, 0, -d], [0, -h, 0]],
     ['back', [x, y, -d], [-w, 0, 0], [0, -h, 0]],
     ['left', [-x, y, -d], [0, 0, d], [0, -h, 0]],
     ['top', [-x, y, -d], [w, 0, 0], [0, 0, d]],
     ['bottom', [-x, -y, 0], [w, 0, 0], [0, 0, -d]],
-  ].map(([side, corner, right, down]) => ({
-          side,
-          corner,
-          right,
-          down,
-          picture: side ? sides?.[side] && beside(file, sides[side]) : ''
-        }));
+  ];
+  return faces.map(([side, corner, right, down]) => {
+    const other = side && sides[side];
+    return {corner, right, down, picture: !side ? '' : other ? beside(file, other) : undefined};
+  });
 }
 
+/** @type {(file: string, other: string) => string} */
 const beside = (file, other) => file.split('/').slice(0, -1).concat(other).join('/');
 
-function box(pattern) {
-  const {box_mm: [w, h, d], sides = {}} = pattern;
-  const sum = (...lengths) => lengths.reduce((all, each) => all + (each || 0), 0);
-  const below = sum(sides.top && w, sides.bottom && w);
+/**
+ * @param {Studio.Pattern} pattern
+ * @param {Point} size
+ * @returns {Surface}
+ */
+function box(pattern, [w, h, d]) {
+  /** @type {(side: Studio.Side, length: number) => number} */
+  const of = (side, length) => (pattern.sides[side] ? length : 0);
+  const below = of('top', w) + of('bottom', w);
   const unit =
-      Math.max(
-          sum(w, sides.right && d, sides.back && w, sides.left && d), below, h + (below ? d : 0)) /
-      2;
-  const faces = boxFaces(pattern).map(
-      ({corner, right, down, picture}) => ({
-        picture,
-        cells: picture === undefined ? [1, 1] : [CELLS[1], CELLS[1]],
-        at: (s, t) => corner.map((value, i) => (value + s * right[i] + t * down[i]) / unit)
-      }));
+      Math.max(w + of('right', d) + of('back', w) + of('left', d), below, h + (below ? d : 0)) / 2;
+  const faces = boxFaces(pattern, [
+                  w, h, d
+                ]).map(({corner, right, down, picture}) => ({
+                         picture,
+                         cells: picture === undefined ? [1, 1] : [CELLS[1], CELLS[1]],
+                         at: (/** @type {number} */ s, /** @type {number} */ t) =>
+                             corner.map((value, i) => (value + s * right[i] + t * down[i]) / unit)
+                       }));
   return {
     unit,
     faces,
@@ -77,22 +110,30 @@ function box(pattern) {
   };
 }
 
-function round(pattern, {width, height}) {
+/**
+ * @param {Studio.Pattern} pattern
+ * @param {Studio.Sized} size
+ * @param {number} mm its width
+ * @returns {Surface}
+ */
+function round(pattern, {width, height}, mm) {
   const most = Math.max(width, height);
   const [halfWidth, halfHeight] = [width / most, height / most];
-  const mm = widthOf(pattern);
+  const top = pattern.top_mm ?? 0;
   const halfArc = Math.min(
       Math.PI,
       pattern.arc_deg ? (pattern.arc_deg * Math.PI) / 360 : (Math.PI * mm) / around(pattern));
   const radius = halfWidth / halfArc;
-  const slope =
-      (0.5 * (pattern.top_mm - (pattern.bottom_mm || pattern.top_mm))) / ((mm * height) / width);
+  const slope = (0.5 * (top - (pattern.bottom_mm || top))) / ((mm * height) / width);
   const rise = Math.sqrt(Math.max(0, 1 - slope * slope));
+  /** @type {(angle: number, y: number) => Point} */
   const point = (angle, y) => {
     const r = radius + slope * y;
     return [r * Math.sin(angle), rise * y, r * Math.cos(angle) - radius];
   };
+  /** @type {(from: number, to: number) => Face['at']} */
   const wall = (from, to) => (s, t) => point(from + s * (to - from), halfHeight * (1 - 2 * t));
+  /** @param {number} y */
   const rim = (y) => Array.from({length: ROUND}, (_, i) => point((2 * Math.PI * i) / ROUND, y));
   const widest = radius + Math.abs(slope) * halfHeight;
   return {
@@ -108,13 +149,15 @@ function round(pattern, {width, height}) {
 }
 
 /**
- * The surface of a pattern whose picture has that size: {unit (millimetres in a unit of the
- * picture's space, null: not known), low, high, faces}. A face, which flat ones have none of,
- * is {picture ('': the pattern's own, undefined: plain), cells, at(s, t)}.
+ * The surface of a pattern whose picture has that size.
+ * @param {Studio.Pattern} pattern
+ * @param {Studio.Sized} size
+ * @returns {Surface}
  */
 export function surfaceOf(pattern, size) {
-  if (pattern.kind === 'box' && pattern.box_mm) return box(pattern);
-  if (isRound(pattern) && widthOf(pattern)) return round(pattern, size);
+  if (pattern.kind === 'box' && pattern.box_mm) return box(pattern, pattern.box_mm);
+  const mm = widthOf(pattern);
+  if (isRound(pattern) && mm) return round(pattern, size, mm);
   const most = Math.max(size.width, size.height);
   const half = [size.width / most, size.height / most, 0];
   return {
@@ -131,11 +174,24 @@ export function surfaceOf(pattern, size) {
  * hides nothing else that does.
  */
 export class SurfacePainter {
+  /** @type {Map<string, HTMLImageElement>} */
   #images = new Map();
 
-  /** redraw: called when a picture has arrived. own: the pattern's own picture. */
-  constructor(canvas, own, redraw) { Object.assign(this, {canvas, own, redraw}); }
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {HTMLImageElement} own the pattern's own picture
+   * @param {() => void} redraw called when a picture has arrived
+   */
+  constructor(canvas, own, redraw) {
+    this.canvas = canvas;
+    this.own = own;
+    this.redraw = redraw;
+  }
 
+  /**
+   * @param {Studio.Eye} eye
+   * @param {Surface} surface
+   */
   paint(eye, {faces, caps}) {
     const dense = devicePixelRatio || 1;
     const [width, height] =
@@ -144,7 +200,7 @@ export class SurfacePainter {
     if (!faces.length) return;
     if (this.canvas.width !== width || this.canvas.height !== height)
       Object.assign(this.canvas, {width, height});
-    const context = this.canvas.getContext('2d');
+    const context = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext('2d'));
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, width, height);
     for (const cap of caps)
@@ -152,17 +208,25 @@ export class SurfacePainter {
     for (const face of faces) this.#face(context, eye, face, dense);
   }
 
+  /** @param {string} picture */
   #imageOf(picture) {
     if (picture === '') return this.own;
-    if (!this.#images.has(picture))
-      this.#images.set(
-          picture, Object.assign(new Image(), {src: thumb(picture, 720), onload: this.redraw}));
-    return this.#images.get(picture);
+    const known = this.#images.get(picture);
+    if (known) return known;
+    const image = Object.assign(new Image(), {src: thumb(picture, 720), onload: this.redraw});
+    this.#images.set(picture, image);
+    return image;
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {Studio.Eye} eye
+   * @param {Face} face
+   * @param {number} dense
+   */
   #face(context, eye, {picture, cells: [across, down], at}, dense) {
     const image = picture === undefined ? null : this.#imageOf(picture);
-    const ready = image?.complete && image.naturalWidth > 0;
+    const ready = image?.complete && image.naturalWidth > 0 ? image : null;
     for (let i = 0; i < across; ++i) {
       for (let j = 0; j < down; ++j) {
         const [left, right, above, below] =
@@ -171,12 +235,18 @@ export class SurfacePainter {
             ([s, t]) => onScreen(eye, at(s, t)));
         if (!facing(places)) continue;
         if (ready)
-          this.#cell(context, image, places, [left, above, right - left, below - above], dense);
+          this.#cell(context, ready, places, [left, above, right - left, below - above], dense);
         else this.#fill(context, places, dense, BODY.side);
       }
     }
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {(Point | null)[]} places
+   * @param {number} dense
+   * @param {string} colour
+   */
   #fill(context, places, dense, colour) {
     if (!facing(places)) return;
     context.setTransform(dense, 0, 0, dense, 0, 0);
@@ -186,7 +256,14 @@ export class SurfacePainter {
     context.stroke();
   }
 
-  /** A part of an image, {left, top, width, height} of 1, in two triangles. */
+  /**
+   * A part of an image, left, top, width and height of 1, in two triangles.
+   * @param {CanvasRenderingContext2D} context
+   * @param {HTMLImageElement} image
+   * @param {Point[]} places
+   * @param {number[]} area
+   * @param {number} dense
+   */
   #cell(context, image, [a, b, c, d], [left, top, width, height], dense) {
     const [w, h] = [image.naturalWidth, image.naturalHeight];
     const [x, y, u, v] = [left * w, top * h, width * w, height * h];
@@ -194,6 +271,7 @@ export class SurfacePainter {
     const [startX, startY] = [Math.max(0, x - OVERLAP * u), Math.max(0, y - OVERLAP * v)];
     const [acrossX, acrossY] =
         [Math.min(w, x + (1 + OVERLAP) * u) - startX, Math.min(h, y + (1 + OVERLAP) * v) - startY];
+    /** @type {(corners: Point[], right: Point, down: Point, from: Point) => void} */
     const triangle = (corners, right, down, from) => {
       context.save();
       context.setTransform(dense, 0, 0, dense, 0, 0);
@@ -206,12 +284,17 @@ export class SurfacePainter {
       context.drawImage(image, startX, startY, acrossX, acrossY, startX, startY, acrossX, acrossY);
       context.restore();
     };
+    /** @type {(p: Point, q: Point) => Point} */
     const minus = (p, q) => [p[0] - q[0], p[1] - q[1]];
     triangle([a, b, d], minus(b, a), minus(d, a), a);
     triangle([c, d, b], minus(c, d), minus(c, b), [b[0] + d[0] - c[0], b[1] + d[1] - c[1]]);
   }
 }
 
+/**
+ * @param {CanvasRenderingContext2D} context
+ * @param {Point[]} places
+ */
 function outline(context, places) {
   context.beginPath();
   for (const [x, y] of places) context.lineTo(x, y);
@@ -221,16 +304,22 @@ function outline(context, places) {
 /**
  * Whether an outline turns clockwise on the screen, as a side does that faces the eye; false of
  * one that is partly behind it.
+ * @param {(Point | null)[]} places
+ * @returns {places is Point[]}
  */
 function facing(places) {
-  if (places.includes(null)) return false;
-  return places.reduce((sum, [x, y], i) => {
-    const [nextX, nextY] = places[(i + 1) % places.length];
+  const seen = places.flatMap((place) => (place ? [place] : []));
+  if (seen.length < places.length) return false;
+  return seen.reduce((sum, [x, y], i) => {
+    const [nextX, nextY] = seen[(i + 1) % seen.length];
     return sum + x * nextY - nextX * y;
   }, 0) > 0;
 }
 
-/** A triangle's corners, pushed outwards. */
+/**
+ * A triangle's corners, pushed outwards.
+ * @param {Point[]} corners
+ */
 function grown(corners) {
   const middle = [0, 1].map((axis) => corners.reduce((sum, corner) => sum + corner[axis], 0) / 3);
   return corners.map(([x, y]) => {

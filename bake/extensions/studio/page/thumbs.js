@@ -1,3 +1,4 @@
+// @ts-check
 // Models as small pictures that turn, drawn by the device's renderer from the bundle: what a card
 // shows is what ships. Only those that are in view are drawn, one frame at a time, and all sides of
 // one only once somebody points at it.
@@ -15,14 +16,25 @@ const MARGIN = 1.05;
 /** Milliseconds without work after which the bundle leaves the GPU. */
 const REST_MS = 4000;
 
-/** The drawing of each model: {baked, views, url}. */
+/** @type {Map<string, { baked: number, views: number, url: string }>} the drawing of each model */
 const strips = new Map();
-/** Models that are in view, or pointed at, and how many views each needs. */
+/**
+ * Models that are in view, or pointed at, and how many views each needs.
+ * @type {Map<string, number>}
+ */
 const wanted = new Map();
 let working = false;
 /** The bake of which nothing could be drawn. */
 let failed = -1;
-/** The bundle on the GPU: {baked, view, box, scenes}; null: none is. */
+/**
+ * @typedef {object} Room
+ * @property {number} baked
+ * @property {Promise<import('./engine/modar-view.js').View>} view
+ * @property {HTMLCanvasElement} models
+ * @property {HTMLElement} box
+ * @property {Studio.Scene[]} scenes
+ */
+/** @type {Room | null} the bundle on the GPU; null: none is */
 let room = null;
 let restTimer = 0;
 
@@ -32,15 +44,13 @@ const rest = () => new Promise((done) => {
 
 function closeRoom() {
   clearTimeout(restTimer);
-  room?.box.querySelector('.models')
-      .getContext('webgl2')
-      ?.getExtension('WEBGL_lose_context')
-      ?.loseContext();
+  room?.models.getContext('webgl2')?.getExtension('WEBGL_lose_context')?.loseContext();
   room?.box.remove();
   room = null;
 }
 
-async function openRoom() {
+/** @returns {Room} */
+function openRoom() {
   clearTimeout(restTimer);
   const {baked, project} = state;
   if (room?.baked === baked) return room;
@@ -52,14 +62,17 @@ async function openRoom() {
   room = {
     baked,
     box,
-    view: null,
+    models,
+    view: bundleBytes().then((bytes) => View.create(bytes, {picture, models, fixedLight: true})),
     scenes: project.bundle.scenes ?? project.scenes.filter(({model}) => model)
   };
-  room.view = await View.create(await bundleBytes(), {picture, models, fixedLight: true});
   return room;
 }
 
-/** The place of the eye to see all models of a pattern. */
+/**
+ * The place of the eye to see all models of a pattern.
+ * @param {Studio.Box} box
+ */
 function eyeOf({low, high}) {
   const target = low.map((value, i) => (value + high[i]) / 2);
   const radius = Math.hypot(...low.map((value, i) => (high[i] - value) / 2));
@@ -68,30 +81,34 @@ function eyeOf({low, high}) {
 
 /**
  * A model on its first picture, from this many sides; models without a picture are in no bundle.
+ * @param {string} model
+ * @param {number} views
  */
 async function drawStrip(model, views) {
-  const {view, scenes, box} = await openRoom();
+  const {view: opened, scenes, models} = openRoom();
+  const view = await opened;
   const number = scenes.findIndex((scene) => scene.model === model);
   const bounds = number < 0 ?
       null :
       view.bounds(view.patterns.findIndex(({name}) => name === scenes[number].pattern));
   const kept = view.patterns.length;
   if (!bounds || !view.stand(model, number)) return '';
-  const canvas = box.querySelector('.models');
   const strip =
       Object.assign(document.createElement('canvas'), {width: views * SIDE, height: SIDE});
-  const context = strip.getContext('2d');
+  const context = /** @type {CanvasRenderingContext2D} */ (strip.getContext('2d'));
   for (let i = 0; i < views; ++i) {
     if (i) await rest();
     view.drawFrom(
         kept, viewFrom({...eyeOf(bounds), turn: (2 * Math.PI * i) / VIEWS, tilt: TILT}),
         SIDE / 2 / Math.tan(FIELD / 2));
-    context.drawImage(canvas, i * SIDE, 0, SIDE, SIDE);
+    context.drawImage(models, i * SIDE, 0, SIDE, SIDE);
   }
   view.forgetPatterns(kept);
-  return URL.createObjectURL(await new Promise((resolve) => {
+  /** @type {Blob | null} */
+  const drawn = await new Promise((resolve) => {
     strip.toBlob(resolve);
-  }));
+  });
+  return drawn ? URL.createObjectURL(drawn) : '';
 }
 
 /** A model that is wanted and not drawn in its present form. */
@@ -107,7 +124,7 @@ async function work() {
   working = true;
   try {
     for (let model = next(); model !== undefined; model = next()) {
-      const [views, {baked}, before] = [wanted.get(model), state, strips.get(model)];
+      const [views, {baked}, before] = [wanted.get(model) ?? 1, state, strips.get(model)];
       await rest();
       strips.set(model, {baked, views, url: await drawStrip(model, views)});
       if (before?.url) URL.revokeObjectURL(before.url);
@@ -123,6 +140,10 @@ async function work() {
   }
 }
 
+/**
+ * @param {string} model
+ * @param {number} views
+ */
 function want(model, views) {
   if (views) wanted.set(model, Math.max(views, wanted.get(model) ?? 0));
   else wanted.delete(model);
@@ -131,30 +152,33 @@ function want(model, views) {
 
 const observer = new IntersectionObserver((entries) => {
   for (const {target, isIntersecting} of entries)
-    want(target.dataset.model, isIntersecting ? 1 : 0);
+    want(/** @type {HTMLElement} */ (target).dataset.model ?? '', isIntersecting ? 1 : 0);
 }, {rootMargin: '120px'});
 
-/**
- * A model's picture, which turns while its card is pointed at. Attributes: model (its name),
- * little.
- */
+/** @typedef {Studio.Vnode<{ model: string, little?: boolean }>} ThumbVnode */
+
+/** A model's picture, which turns while its card is pointed at. */
 export class ModelThumb {
+  /** @param {ThumbVnode} vnode */
   oncreate({dom, attrs}) {
     observer.observe(dom);
     const card = dom.closest('a, button') ?? dom;
-    this.turn = () => want(attrs.model, VIEWS);
-    for (const event of ['pointerenter', 'focus']) card.addEventListener(event, this.turn);
+    const turn = () => want(attrs.model, VIEWS);
+    for (const event of ['pointerenter', 'focus']) card.addEventListener(event, turn);
   }
 
+  /** @param {ThumbVnode} vnode */
   onupdate({attrs}) {
     if (wanted.has(attrs.model)) work();
   }
 
+  /** @param {ThumbVnode} vnode */
   onremove({dom, attrs}) {
     observer.unobserve(dom);
     want(attrs.model, 0);
   }
 
+  /** @param {ThumbVnode} vnode */
   view({attrs: {model, little}}) {
     const {url, views} = strips.get(model) ?? {};
     return m(

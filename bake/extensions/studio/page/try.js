@@ -1,9 +1,10 @@
+// @ts-check
 // Step 4: the bundle as visitors will see it, with this machine's camera, on a video, or on a
 // phone next to it.
 import {ask, askJson} from './api.js';
 import {load as openTracker} from './engine/modar.js';
 import {View} from './engine/modar-view.js';
-import {button, finding, head, icon, tool} from './parts.js';
+import {button, finding, head, icon, part, tool} from './parts.js';
 import {state, tellError} from './state.js';
 import {said, t} from './words.js';
 
@@ -18,18 +19,28 @@ const CAMERA = {
  * failed(error).
  */
 class Player {
+  /** @type {import('./engine/modar.js').Modar | null} */
   #tracker = null;
   #ended = false;
+  /** @type {Set<string>} */
   #seen = new Set();
 
+  /**
+   * @param {HTMLElement} box
+   * @param {{ found(names: string[]): void, failed(error: Studio.Wrong): void }} told
+   */
   constructor(box, told) {
     this.told = told;
     this.box = box;
-    this.video = box.querySelector('video');
-    this.layers = {picture: box.querySelector('.picture'), models: box.querySelector('.models')};
+    this.video = part(box, 'video', HTMLVideoElement);
+    this.layers = {
+      picture: part(box, '.picture', HTMLCanvasElement),
+      models: part(box, '.models', HTMLCanvasElement)
+    };
+    this.address = '';
   }
 
-  /** source: a stream of a camera, or a file. */
+  /** @param {MediaStream | Blob} source a stream of a camera, or a file */
   async play(source) {
     const bytes = new Uint8Array(await (await ask('GET', 'bundle')).arrayBuffer());
     const [view, tracker] =
@@ -54,6 +65,10 @@ class Player {
     await tracker.start(this.video, {extended: true});
   }
 
+  /**
+   * @param {string} name
+   * @param {boolean} seen
+   */
   #know(name, seen) {
     this.#seen[seen ? 'add' : 'delete'](name);
     this.told.found([...this.#seen]);
@@ -62,7 +77,8 @@ class Player {
   close() {
     this.#ended = true;
     this.#tracker?.close();
-    this.video.srcObject?.getTracks().forEach((track) => track.stop());
+    const stream = this.video.srcObject;
+    if (stream instanceof MediaStream) stream.getTracks().forEach((track) => track.stop());
     this.video.srcObject = null;
     this.video.removeAttribute('src');
     if (this.address) URL.revokeObjectURL(this.address);
@@ -72,19 +88,26 @@ class Player {
 
 /** A QR code as an image: an SVG of the server is shown, never part of the page. */
 class Code {
-  oninit({attrs}) {
+  /** @param {Studio.Vnode<{ svg: string }>} vnode */
+  constructor({attrs}) {
     this.address = URL.createObjectURL(new Blob([attrs.svg], {type: 'image/svg+xml'}));
   }
 
   onremove() { URL.revokeObjectURL(this.address); }
 
-  view() { return m('img.code', {src: this.address, alt: t('qr')}); }
+  /** @param {Studio.Vnode<{ svg: string }>} _ */
+  view(_) { return m('img.code', {src: this.address, alt: t('qr')}); }
 }
 
 export class Try {
-  oninit() {
-    this.source = null;  // the played bundle: a stream or a file
+  constructor() {
+    /** @type {MediaStream | Blob | null} what the bundle is played on */
+    this.source = null;
+    /** @type {Player | null} */
+    this.player = null;
+    /** @type {string[]} */
     this.found = [];
+    /** @type {Studio.Said | null} */
     this.failure = null;
     this.phone = state.project.phone;
   }
@@ -96,13 +119,16 @@ export class Try {
       this.open(await navigator.mediaDevices.getUserMedia(CAMERA));
     } catch (error) {
       this.failure = {
-        text: t(error.name === 'NotAllowedError' ? 'cameraRefused' : 'cameraMissing'),
+        text:
+            t(error instanceof Error && error.name === 'NotAllowedError' ? 'cameraRefused' :
+                                                                           'cameraMissing'),
         cure: t('cameraCure')
       };
     }
     m.redraw();
   }
 
+  /** @param {MediaStream | Blob} source */
   open(source) {
     this.close();
     this.failure = null;
@@ -115,7 +141,12 @@ export class Try {
     this.found = [];
   }
 
-  begin(dom) {
+  /**
+   * @param {HTMLElement} dom
+   * @param {MediaStream | Blob} source
+   */
+  begin(dom, source) {
+    /** @param {Studio.Wrong & { reason?: string }} error */
     const failed = (error) => {
       this.close();
       this.failure =
@@ -129,7 +160,7 @@ export class Try {
       },
       failed
     });
-    this.player.play(this.source).catch(failed);
+    this.player.play(source).catch(failed);
   }
 
   async startPhone() {
@@ -145,9 +176,10 @@ export class Try {
     m.redraw();
   }
 
-  playing() {
+  /** @param {MediaStream | Blob} source */
+  playing(source) {
     return m(
-        'div.playing', {key: state.baked, oncreate: ({dom}) => this.begin(dom)},
+        'div.playing', {key: state.baked, oncreate: ({dom}) => this.begin(dom, source)},
         m('video', {muted: true, playsinline: true, 'aria-hidden': 'true', tabindex: -1}),
         m('canvas.picture', {'aria-hidden': 'true'}),
         m('canvas.models', {role: 'img', 'aria-label': t('stage')}),
@@ -174,7 +206,7 @@ export class Try {
     return m(
         'div.screen', m('div.top', head(t('try'), t('tryLead')), next),
         this.failure && finding({...this.failure, severity: 'error'}),
-        m('div.ways', this.source ? [this.playing()] : [
+        m('div.ways', this.source ? [this.playing(this.source)] : [
           m('div.card.way', {key: 'camera'}, icon('camera'), m('h2', t('withCamera')),
             m('p', t('withCameraWords')),
             button(t('startCamera'), () => this.camera(), {kind: '.quiet'})),
@@ -183,7 +215,7 @@ export class Try {
             m('label.button.quiet', m('span', t('chooseFilm')), m('input.unseen', {
                 type: 'file',
                 accept: 'video/*',
-                onchange: (event) => event.target.files[0] && this.open(event.target.files[0])
+                onchange: (event) => event.target.files?.[0] && this.open(event.target.files[0])
               }))),
           m('div.wrap', {key: 'phone'}, this.phoneCard())
         ]));
