@@ -14,6 +14,7 @@ namespace {
 // Longer side, in pixels, at which figures are searched. Larger takes time and finds more texture;
 // corners are measured on the photo itself.
 constexpr double kSearchSide = 800;
+constexpr double kRefineSide = 4096;    // of the photo then: larger takes 40 bytes a pixel
 constexpr std::size_t kMostLines = 60;  // the longest; their pairs of pairs are tried
 constexpr double kJoinDegrees = 2.0;    // segments of one line: a photo bends lines by as much
 constexpr double kJoinPixels = 3.0;
@@ -716,6 +717,11 @@ void keep_better(const Gradients& gradients, const Foreground& object,
   found.divided = divided;
 }
 
+/// A place in pixels whose centres are whole numbers, in a picture that is larger by a factor.
+Point magnified(const Point& place, double factor) {
+  return (place + Point(0.5, 0.5)) * factor - Point(0.5, 0.5);
+}
+
 Result<FoundCorners> search(const RgbaImage& photo) {
   const cv::Mat rgba(static_cast<int>(photo.height), static_cast<int>(photo.width), CV_8UC4,
                      const_cast<std::uint8_t*>(photo.pixels.data()));
@@ -750,9 +756,15 @@ Result<FoundCorners> search(const RgbaImage& photo) {
   found.fills = area_of(corners) > kFilled * small.cols * small.rows;
   found.framed = framed(figures, corners) || (!found.fills && goes_on(gradients, corners));
   found.rivalled = object.rivalled();
-  for (Point& corner : corners) corner = (corner + Point(0.5, 0.5)) * scale - Point(0.5, 0.5);
-  corners = refine(Gradients(rgb), corners, {1.2 * scale, 1.2, 1.2});
-  for (std::size_t i = 0; i < 4; ++i) found.corners[i] = {corners[i].x, corners[i].y};
+  const double fine = std::max(1.0, std::max(rgb.cols, rgb.rows) / kRefineSide);
+  if (fine > 1) cv::resize(rgb, rgb, cv::Size(), 1 / fine, 1 / fine, cv::INTER_AREA);
+  const double step = scale / fine;
+  for (Point& corner : corners) corner = magnified(corner, step);
+  corners = refine(Gradients(rgb), corners, {1.2 * step, 1.2, 1.2});
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Point corner = magnified(corners[i], fine);
+    found.corners[i] = {corner.x, corner.y};
+  }
   return found;
 }
 

@@ -116,6 +116,25 @@ TEST(FindCorners, AShadowIsNoPartOfTheThing) {
   }
 }
 
+TEST(FindCorners, OfALargePhotoAreInItsPixels) {
+  const Corners corners = {
+      {{250.3f, 150.6f}, {720.2f, 120.4f}, {760.8f, 560.1f}, {220.7f, 520.9f}}};
+  constexpr double kTimes = 5;  // 17 megapixels: more than corners are measured at
+  cv::Mat large;
+  cv::resize(photograph(asset("mural.png"), backdrop(""), corners), large, cv::Size(), kTimes,
+             kTimes, cv::INTER_CUBIC);
+  const auto found = find_corners(as_photo(large));
+  ASSERT_TRUE(found) << found.error().cause;
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR(found->corners[i].x, kTimes * (static_cast<double>(corners[i].x) + 0.5) - 0.5,
+                2 * kTimes)
+        << i;
+    EXPECT_NEAR(found->corners[i].y, kTimes * (static_cast<double>(corners[i].y) + 0.5) - 0.5,
+                2 * kTimes)
+        << i;
+  }
+}
+
 TEST(FindCorners, APhotoThatIsThePictureAlreadyIsDoubted) {
   cv::Mat scan = asset("mural.png");
   cv::resize(scan, scan, cv::Size(900, 700));
