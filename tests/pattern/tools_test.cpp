@@ -189,6 +189,7 @@ TEST(Score, NamesWhatIsWrongWithAPicture) {
       EXPECT_LT(value_of(bad, id), 60) << id;
       EXPECT_LT(value_of(bad, id), value_of(good, id)) << id;
     }
+    EXPECT_STREQ(first_cause(bad).id, ids[0]);
     for (const ScoreCause& cause : bad.causes) {
       // The best grade comes without advice.
       EXPECT_EQ(*cause.advice != 0, bad.grade != 'A' && cause.value < 60)
