@@ -66,6 +66,10 @@ Result<void> take_files(BakeCommand& command) {
       if (!is_material_file(path)) command.models.push_back(texts[path]);
     }
   }
+  for (const std::string& path : sorted.textures) {
+    command.said.push_back({"bake.texture", DiagnosticSeverity::kInfo, path, 0,
+                            "it is a model's texture, so no pattern", "--pattern makes it one"});
+  }
   for (const LeftOut& one : sorted.left_out) {
     const bool picture = is_picture_file(one.file) || is_foreign_picture_file(one.file);
     const bool only = picture ? command.patterns.empty() : command.models.empty();

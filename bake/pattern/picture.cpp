@@ -46,6 +46,14 @@ Result<GrayPicture> load_gray(const std::string& path) {
   return gray_of(image);
 }
 
+std::array<int, 2> pattern_sides(int width, int height) {
+  const double scale = std::min(1.0, 1.0 * kLargestPattern / std::max(width, height));
+  const auto scaled = [&](int side) {
+    return std::max(1, static_cast<int>(std::lround(side * scale)));
+  };
+  return {scaled(width), scaled(height)};
+}
+
 Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk) {
   if (path.ends_with(".mind")) {
     return fail(ExitCode::kUnsupported, "pattern.mind", path,
@@ -53,15 +61,14 @@ Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk) {
                 "pass the pictures that it was compiled from, in the same order");
   }
   MODAR_ASSIGN(GrayPicture gray, is_target_file(path) ? load_target(path) : load_gray(path));
-  const int longest = std::max(gray.width, gray.height);
-  shrunk = longest > kLargestPattern;
+  const auto [width, height] = pattern_sides(gray.width, gray.height);
+  shrunk = width < gray.width || height < gray.height;
   if (!shrunk) return gray;
   try {
-    const double scale = static_cast<double>(kLargestPattern) / longest;
     const cv::Mat large(gray.height, gray.width, CV_8UC1, gray.pixels.data());
     GrayPicture out;
-    out.width = std::max(1, static_cast<int>(std::lround(gray.width * scale)));
-    out.height = std::max(1, static_cast<int>(std::lround(gray.height * scale)));
+    out.width = width;
+    out.height = height;
     out.pixels.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
     cv::Mat small(out.height, out.width, CV_8UC1, out.pixels.data());
     cv::resize(large, small, small.size(), 0, 0, cv::INTER_AREA);

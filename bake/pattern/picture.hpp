@@ -1,6 +1,7 @@
 // Pattern pictures in memory: read, in gray, and no larger than is useful.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -19,6 +20,8 @@ Result<GrayPicture> load_gray(const std::string& path);
 /// its longer side at most 720 pixels. shrunk: whether it was made smaller. Errors: also
 /// kUnsupported "pattern.mind", and those of load_target().
 Result<GrayPicture> load_pattern(const std::string& path, bool& shrunk);
+/// The sides of the picture that load_pattern() makes of one.
+std::array<int, 2> pattern_sides(int width, int height);
 /// The SectionType::kPatternColours section of a picture: the mean colours of eight by eight cells,
 /// in linear light, transparent pixels as white paper.
 std::vector<std::byte> pattern_colours(const RgbaImage& image);

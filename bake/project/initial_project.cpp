@@ -246,9 +246,11 @@ void report_pairs(const ScenePairs& pairs, const std::vector<std::string>& model
                           "its picture"});
   }
   if (!idle.empty()) {
-    found.said.push_back({"project.idle", DiagnosticSeverity::kWarning, found.folder, 0,
-                          "no picture is left for: " + listed(idle),
-                          "add a [[scene]] for each, or more pictures"});
+    found.said.push_back(
+        {"project.idle", DiagnosticSeverity::kWarning, found.folder, 0,
+         (pairs.guessed ? "no picture is left for: " : "no picture has the name of: ") +
+             listed(idle),
+         "add a [[scene]] for each, or more pictures"});
   }
 }
 

@@ -414,17 +414,21 @@ Result<void> TrackerRecordOptions::validate() const {
   return {};
 }
 
+Result<void> require_pattern_size(int width, int height) {
+  const auto [shorter, longer] = std::minmax(width, height);
+  if (shorter >= kSmallestSide && longer <= kLargestSide) return {};
+  return fail(ExitCode::kInvalidInput, "pattern.loop-size", "",
+              "the picture has " + std::to_string(width) + "x" + std::to_string(height) +
+                  " pixels, and each side needs 32 to 1023",
+              "give a larger picture, or crop it closer to a square");
+}
+
 Result<std::vector<std::byte>> make_tracker_record(const GrayImage& pattern,
                                                    const TrackerRecordOptions& options,
                                                    const PatternSurface& surface,
                                                    double* repeated) {
   MODAR_TRY(options.validate());
-  if (pattern.width < kSmallestSide || pattern.height < kSmallestSide ||
-      pattern.width > kLargestSide || pattern.height > kLargestSide) {
-    return fail(ExitCode::kInvalidInput, "pattern.loop-size", "",
-                "the picture is smaller than 32 or larger than 1023 pixels on a side",
-                "give another size");
-  }
+  MODAR_TRY(require_pattern_size(pattern.width, pattern.height));
   const std::vector<ViewLevel> levels = view_levels(pattern);
   const std::vector<RecordFeature> candidates = find_candidates(levels, surface, options.jobs);
   const Trials trials = run_trials(levels, surface, candidates, options.trial_views, options.jobs);

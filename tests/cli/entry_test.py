@@ -55,6 +55,7 @@ class SameFiles(ProgramTest):
         files = sorted(path.name for path in self.place.iterdir())
         baked = self.modar("bake", *files, "-o", self.folder / "files.modar", *QUICK, cwd=self.place)
         self.assertEqual(baked.returncode, 0, baked.stderr)
+        self.assertIn("pottery.png: it is a model's texture, so no pattern", baked.stderr)
         told, project = self.init()
         [pattern] = project["pattern"]
         for (x, y), (true_x, true_y) in zip(pattern["corners"], CORNERS):
@@ -82,11 +83,12 @@ class SameFiles(ProgramTest):
         museum(self.place)
         (self.place / "zero.obj").touch()
         (self.place / "zero.png").touch()
+        picture(self.place / "tiny.png", 20, 16)
         (self.place / "broken.png").write_bytes(COVER.read_bytes()[:2000])
         (self.place / "points.ply").write_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n")
         subprocess.run(["ffmpeg", "-v", "error", "-y", "-i", COVER, "-lossless", "1", self.place / "cover.webp"], check=True)
         told, project = self.init()
-        for name in ("zero.obj", "zero.png", "broken.png", "points.ply", "IMG_1.HEIC"):
+        for name in ("zero.obj", "zero.png", "tiny.png", "broken.png", "points.ply", "IMG_1.HEIC"):
             self.assertRegex(told, rf"{name}.*left out: .*; ")
         self.assertEqual(sorted(one["file"] for one in project["pattern"]), ["card.png", "cover.webp"])
         done = self.modar("bake", cwd=self.place)
@@ -110,6 +112,7 @@ class SameFiles(ProgramTest):
         (self.place / "modar.toml").unlink()
         told, project = self.init()
         self.assertNotIn("guess", told)
+        self.assertIn("no picture has the name of: vase", told)
         self.assertNotIn("scene", project)
 
 

@@ -8,9 +8,11 @@
 #include "bake/import/read_model.hpp"
 #include "bake/io/input.hpp"
 #include "bake/options/request_text.hpp"
+#include "bake/pattern/pattern.hpp"
 #include "formats/base/path.hpp"
 #include "formats/base/shortest_number.hpp"
 #include "formats/base/utf8.hpp"
+#include "modar/pattern_record.hpp"
 
 namespace modar {
 namespace {
@@ -151,6 +153,13 @@ Result<void> find_picture(PatternRequest& pattern, std::vector<Diagnostic>& said
           (text.back() == '=' ? "" : ":") + shortest_text(corner.x) + ":" + shortest_text(corner.y);
     }
     MODAR_ASSIGN(pattern.shape, parse_shape(text));
+  } else {
+    const auto [width, height] =
+        pattern_sides(static_cast<int>(photo.image.width), static_cast<int>(photo.image.height));
+    if (auto size = require_pattern_size(width, height); !size) {
+      size.error().where = pattern.path;
+      return size;
+    }
   }
   if (!found.corners && *found.doubt == 0) return {};
   const std::string what =

@@ -28,6 +28,9 @@ struct TrackerRecordOptions {
   [[nodiscard]] Result<void> validate() const;
 };
 
+/// Errors: kInvalidInput "pattern.loop-size", unless each side has 32 to 1023 pixels.
+Result<void> require_pattern_size(int width, int height);
+
 /// The bytes of a SectionType::kTrackerRecord section. pattern: 8-bit gray, at most 1023 pixels a
 /// side. The same picture gives the same bytes on every machine. Errors: kInvalidInput
 /// "pattern.loop-size"; "pattern.no-features" where nothing repeats. surface: of the pattern.
