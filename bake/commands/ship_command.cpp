@@ -64,7 +64,6 @@ Result<std::string> ask_pass_phrase() {
 
 Result<SecretKey> load_key(const std::string& path, const std::string& pass_phrase_file) {
   MODAR_ASSIGN(const auto text, read_text(path));
-  warn_of_readers(path);
   std::string pass_phrase;
   if (!pass_phrase_file.empty()) {
     MODAR_ASSIGN(const auto file, read_text(pass_phrase_file));
@@ -75,7 +74,11 @@ Result<SecretKey> load_key(const std::string& path, const std::string& pass_phra
     pass_phrase = *asked;
   }
   auto key = parse_secret_key(text, pass_phrase);
-  if (!key) key.error().where = path;
+  if (!key) {
+    key.error().where = path;
+  } else {
+    warn_of_readers(path);
+  }
   return key;
 }
 

@@ -25,6 +25,7 @@ std::string format_conversion(const std::string& path, const std::string& extens
     return "convert it: blender -b " + shell_quoted(path) +
            " --python-expr \"import bpy; bpy.ops.export_scene.gltf(filepath=" + glb + ")\"";
   }
+  if (extension == ".modar") return "it is baked already; pass the model that it was made from";
   return "convert it to glTF 2.0 (.glb, .gltf), Wavefront OBJ, PLY or STL";
 }
 

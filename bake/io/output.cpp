@@ -78,7 +78,7 @@ Result<OutputFolder> OutputFolder::claim(const std::string& folder, bool force) 
   std::error_code error;
   remove_left_staging(folder);
   const bool there = fs::exists(folder, error);
-  const bool empty = !there || fs::is_empty(folder, error);
+  const bool empty = !there || !fs::is_directory(folder, error) || fs::is_empty(folder, error);
   if (!error && !empty && !force && !fs::exists(fs::path(folder) / kFolderMark, error)) {
     return fail(ExitCode::kUsage, "out.foreign-folder", folder,
                 "the folder contains files that modar has not written",

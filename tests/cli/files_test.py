@@ -82,6 +82,7 @@ class Inputs(ProgramTest):
         done = self.run_program("modar-fetch", "--store", self.folder / "store", "--verify", "--status", status)
         self.assert_fails(done, 1, "out.foreign", "status.json")
         self.assertEqual(status.read_text(), thesis)
+        self.assert_fails(self.modar("inspect", bundle, "--extract", status), 2, "Not a directory")
 
     def test_pictures_beside_patterns(self):
         path, _ = self.aliases(COVER)

@@ -317,6 +317,9 @@ class Keys(ShipTest):
             done = self.modar(*publish)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual("[key.mode]" in done.stderr, told, oct(mode))
+        done = self.modar(*publish[:-1], self.trust)  # no secret is in it
+        self.assert_fails(done, 3, "not a minisign secret key")
+        self.assertNotIn("key.mode", done.stderr)
 
     @unittest.skipUnless(shutil.which("minisign"), "minisign is not installed")
     def test_minisign_verifies_ours_and_we_its(self):

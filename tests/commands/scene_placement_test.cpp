@@ -107,6 +107,7 @@ TEST(Placement, MillimetresNeedAWidth) {
   const auto refused = resolve_scene(request, wide_picture(0), 0, {0, {1, 1, 1}});
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, "scene.no-width");
+  EXPECT_NE(refused.error().cure.find("in modar.toml width = "), std::string::npos);
   // Sides 1, 2, 4: z is the largest, 2 units high at scale 1, which are 200 mm.
   const auto tall = resolve_scene(request, wide_picture(), 0, {0, {1, 2, 4}});
   ASSERT_TRUE(tall);

@@ -1059,7 +1059,9 @@ TEST(Stages, SayThatNothingIsLeft) {
   EXPECT_EQ(chunk({}, {}, report).error().code, "model.empty");
   ChunkedMesh nothing;
   EXPECT_EQ(make_levels(nothing, {}, report).error().code, "model.empty");
-  EXPECT_EQ(pack(nothing, {}, {}, report).error().code, "model.no-area");
+  const Error packed = pack(nothing, {}, {}, report).error();
+  EXPECT_EQ(packed.code, "model.no-area");
+  EXPECT_EQ(packed.cure.find("int16"), std::string::npos) << "it was tried";
 }
 
 TEST(Levels, LevelZeroAndVerticesAreThoseWithoutLevels) {

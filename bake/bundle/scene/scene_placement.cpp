@@ -175,7 +175,8 @@ tl::unexpected<Error> no_width(const SceneRequest& request) {
   return scene_error(
       "scene.no-width", request,
       "it gives a length, but the printed width of '" + request.pattern + "' is unknown",
-      "give the width with the picture, as in --pattern FILE:210mm, or use scale=");
+      "give the picture's width (--pattern FILE:210mm, in modar.toml width = \"210mm\"), or use "
+      "scale instead");
 }
 
 Result<SceneRequest> resolve_scene(const SceneRequest& request, const BundleContent& content,

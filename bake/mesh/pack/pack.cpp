@@ -333,7 +333,7 @@ Result<PackedMesh> pack(const ChunkedMesh& chunked, const std::vector<std::uint3
   if (out.chunks.empty()) {
     return fail(ExitCode::kInvalidInput, "model.no-area", mesh.name,
                 "all its triangles are smaller than the resolution of positions",
-                "bake it with --positions int16 or a --max-error");
+                "remove parts that are far from the others, or bake it with a --max-error");
   }
   report_collapsed(mesh.name, collapsed, options.positions, report);
   errors.write(mesh.placement.scale, out.record);
