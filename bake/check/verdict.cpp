@@ -90,6 +90,8 @@ constexpr IssueKind kKinds[] = {
      kRebake},
     {"SCENE_CONTENT", Severity::kError,
      "A scene's shadow does not follow from its model and its place", kRebake},
+    {"SOURCE_READER", Severity::kWarning, "One reader alone has read a model or its colours",
+     "look at it in another viewer; the second reader is in the package of `modar-lab`"},
 };
 static_assert(std::size(kKinds) == static_cast<std::size_t>(WorkstationRule::kCount));
 

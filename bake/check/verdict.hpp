@@ -46,6 +46,7 @@ enum class WorkstationRule : std::uint8_t {
   kTextureContent,
   kPatternContent,
   kSceneContent,
+  kSourceReader,
   kCount
 };
 

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "bake/check/source/second_check.hpp"
 #include "bake/check/text_check.hpp"
 #include "bake/commands/check_command.hpp"
 #include "bake/import/read_model.hpp"
@@ -12,6 +13,7 @@
 #include "bake/io/terminal.hpp"
 #include "bake/options/options.hpp"
 #include "bake/options/request_text.hpp"
+#include "bake/process/process.hpp"
 #include "bake/project/project.hpp"
 #include "formats/base/path.hpp"
 
@@ -166,6 +168,7 @@ Result<void> check_against_sources(const BundleView& bundle, const CheckCommand&
   const BakeRequest& request = sources.request;
   if (sources.texts) check_texts(bundle, *sources.texts, sink);
   MODAR_ASSIGN(extras.source, bake_and_compare(bundle, command, request, sink));
+  MODAR_TRY(check_second(bundle, request, companion_file(kSecondReader), sink));
   if (!command.visual.empty()) {
     MODAR_ASSIGN(extras.looks, compare_looks(bundle, command, request, sink));
   }

@@ -11,6 +11,8 @@ from programs import ROOT, ProgramTest
 
 FOLDER = ROOT / "tests" / "corrupt" / "workstation"
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+# Of the laboratory's program, which the core has not.
+SECOND = re.compile(" SOURCE_READER |a second reader's")
 # Lines with measurements, besides the issues: other tests hold these.
 REPORT = re.compile(r"\S+\.modar: (good|BAD)$|(error|warning|info) ")
 
@@ -21,11 +23,13 @@ class Corrupt(ProgramTest):
         words = [str(self.folder) if word == "OUT" else word
                  for word in (FOLDER / f"{case}.args").read_text().split("\n")[:-1]]
         done = self.modar("check", f"{case}.modar", *words, cwd=FOLDER)
-        lines = [line for line in done.stdout.split("\n") if REPORT.match(line)]
+        lines = [line for line in done.stdout.split("\n")
+                 if REPORT.match(line) and (case == "SOURCE_READER" or not SECOND.search(line))]
         return "".join(line + "\n" for line in lines), done
 
     def assert_like(self, report, expected, note):
         """Words are equal; numbers, which processors and drivers round in their own ways, nearly so."""
+        report, expected = (re.sub("its colours: the .*?; look", "its colours; look", text) for text in (report, expected))
         self.assertEqual(NUMBER.sub("#", report), NUMBER.sub("#", expected), note)
         for ours, theirs in zip(NUMBER.findall(report), NUMBER.findall(expected)):
             self.assertAlmostEqual(float(ours), float(theirs), delta=0.02 + 0.02 * abs(float(theirs)), msg=note)

@@ -121,6 +121,7 @@ constexpr CorruptCase kWorkstationCases[] = {
     {"DEVICE_ETC1", [] { return encode(texture_content()); }},
     {"SOURCE_MISSING", [] { return encode(model_content()); }},
     {"SOURCE_BYTES", plain_octahedron},
+    {"SOURCE_READER", plain_octahedron},
     {"SOURCE_SURFACE", [] { return encode(model_content()); }},
     {"SOURCE_COLOUR", [] { return encode(texture_content()); }},
     {"SOURCE_COUNTS", [] { return encode(model_content()); }},

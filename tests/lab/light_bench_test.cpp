@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "bake/check/picture/visual_check.hpp"
 #include "bake/extensions/lab/path_tracer.hpp"
 
 namespace {

@@ -26,18 +26,23 @@ struct ShadedVertex {
   glm::dvec4 colour{1.0};
 };
 
+long wrapped(long x, long size, Wrap wrap) {
+  if (wrap == Wrap::kClamp) return std::clamp(x, 0L, size - 1);
+  const long period = wrap == Wrap::kMirror ? 2 * size : size;
+  x = (x % period + period) % period;
+  return std::min(x, 2 * size - 1 - x);
+}
+
 /// Texel of a level, wrapped or clamped.
-glm::dvec4 texel(const RgbaImage& image, long x, long y, bool repeat) {
-  const long width = image.width;
-  const long height = image.height;
-  x = repeat ? (x % width + width) % width : std::clamp(x, 0L, width - 1);
-  y = repeat ? (y % height + height) % height : std::clamp(y, 0L, height - 1);
+glm::dvec4 texel(const RgbaImage& image, long x, long y, const std::array<Wrap, 2>& wrap) {
+  x = wrapped(x, long{image.width}, wrap[0]);
+  y = wrapped(y, long{image.height}, wrap[1]);
   const std::uint8_t* p = image.pixels.data() + 4 * (static_cast<std::size_t>(y) * image.width +
                                                      static_cast<std::size_t>(x));
   return glm::dvec4(p[0], p[1], p[2], p[3]) / 255.0;
 }
 
-glm::dvec4 bilinear(const RgbaImage& image, const glm::dvec2& uv, bool repeat) {
+glm::dvec4 bilinear(const RgbaImage& image, const glm::dvec2& uv, const std::array<Wrap, 2>& wrap) {
   const double x = uv.x * image.width - 0.5;
   const double y = uv.y * image.height - 0.5;
   const auto left = static_cast<long>(std::floor(x));
@@ -45,8 +50,8 @@ glm::dvec4 bilinear(const RgbaImage& image, const glm::dvec2& uv, bool repeat) {
   const double u = x - static_cast<double>(left);
   const double v = y - static_cast<double>(top);
   return glm::mix(
-      glm::mix(texel(image, left, top, repeat), texel(image, left + 1, top, repeat), u),
-      glm::mix(texel(image, left, top + 1, repeat), texel(image, left + 1, top + 1, repeat), u), v);
+      glm::mix(texel(image, left, top, wrap), texel(image, left + 1, top, wrap), u),
+      glm::mix(texel(image, left, top + 1, wrap), texel(image, left + 1, top + 1, wrap), u), v);
 }
 
 }  // namespace
@@ -64,8 +69,8 @@ glm::dvec4 look_up(const SoftTexture& texture, const glm::dvec2& uv, double leve
   level = std::clamp(level, 0.0, top);
   const auto fine = static_cast<std::size_t>(level);
   const auto coarse = std::min(fine + 1, texture.levels.size() - 1);
-  return glm::mix(bilinear(texture.levels[fine], uv, texture.repeat),
-                  bilinear(texture.levels[coarse], uv, texture.repeat),
+  return glm::mix(bilinear(texture.levels[fine], uv, texture.wrap),
+                  bilinear(texture.levels[coarse], uv, texture.wrap),
                   level - static_cast<double>(fine));
 }
 
@@ -75,7 +80,7 @@ Result<std::vector<SoftTexture>> load_textures(const TriMesh& mesh, unsigned job
   for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
     if (mesh.uvs.empty() || mesh.materials[m].diffuse_map.empty()) continue;
     MODAR_ASSIGN(const RgbaImage image, read_image(mesh.materials[m].diffuse_map));
-    textures[m].repeat = repeats[m];
+    if (repeats[m]) textures[m].wrap = {Wrap::kRepeat, Wrap::kRepeat};
     textures[m].levels = mip_chain(image, repeats[m], jobs);
   }
   return textures;

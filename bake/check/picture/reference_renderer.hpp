@@ -2,6 +2,7 @@
 // look like, from its source and its uncompressed pictures.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include <glm/mat4x4.hpp>
@@ -20,7 +21,7 @@ namespace modar {
 /// A material's picture as mip levels; no levels: it has none.
 struct SoftTexture {
   std::vector<RgbaImage> levels;
-  bool repeat = false;
+  std::array<Wrap, 2> wrap{};  ///< along u, v
 };
 
 /// Uncompressed pictures of all materials, at their own size. Errors: those of read_image().

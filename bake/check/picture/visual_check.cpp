@@ -275,6 +275,40 @@ glm::dvec3 lab_of(const std::uint8_t* pixel) {
   return {116 * y - 16, 500 * (x - y), 200 * (y - z)};
 }
 
+double ciede2000(const glm::dvec3& a, const glm::dvec3& b) {
+  constexpr double kDegree = 0.017453292519943295;
+  const auto seventh = [](double x) { return std::pow(x, 7.0); };
+  const double mean_chroma = (std::hypot(a.y, a.z) + std::hypot(b.y, b.z)) / 2;
+  const double stretch =
+      1.5 - 0.5 * std::sqrt(seventh(mean_chroma) / (seventh(mean_chroma) + seventh(25.0)));
+  const glm::dvec2 p(a.y * stretch, a.z);
+  const glm::dvec2 q(b.y * stretch, b.z);
+  const double c1 = glm::length(p);
+  const double c2 = glm::length(q);
+  const auto hue = [](const glm::dvec2& v) {
+    const double angle = v.x == 0 && v.y == 0 ? 0.0 : std::atan2(v.y, v.x) / kDegree;
+    return angle < 0 ? angle + 360 : angle;
+  };
+  const double h1 = hue(p);
+  const double h2 = hue(q);
+  const bool gray = c1 * c2 == 0;
+  double turn = gray ? 0.0 : h2 - h1;
+  if (turn > 180) turn -= 360;
+  if (turn < -180) turn += 360;
+  double h = gray ? h1 + h2 : (h1 + h2) / 2;
+  if (!gray && std::fabs(h1 - h2) > 180) h += h1 + h2 < 360 ? 180 : -180;
+  const double l = (a.x + b.x) / 2 - 50;
+  const double c = (c1 + c2) / 2;
+  const double t = 1 - 0.17 * std::cos((h - 30) * kDegree) + 0.24 * std::cos(2 * h * kDegree) +
+                   0.32 * std::cos((3 * h + 6) * kDegree) - 0.20 * std::cos((4 * h - 63) * kDegree);
+  const double of_l = (b.x - a.x) / (1 + 0.015 * l * l / std::sqrt(20 + l * l));
+  const double of_c = (c2 - c1) / (1 + 0.045 * c);
+  const double of_h = 2 * std::sqrt(c1 * c2) * std::sin(turn / 2 * kDegree) / (1 + 0.015 * c * t);
+  const double bend = 60 * std::exp(-std::pow((h - 275) / 25, 2)) * kDegree;
+  const double rotate = -2 * std::sqrt(seventh(c) / (seventh(c) + seventh(25.0))) * std::sin(bend);
+  return std::sqrt(of_l * of_l + of_c * of_c + of_h * of_h + rotate * of_c * of_h);
+}
+
 double mean_delta_e(const RgbaImage& a, const RgbaImage& b,
                     const std::array<std::uint8_t, 3>& clear) {
   double sum = 0;

@@ -45,6 +45,10 @@ struct ModelLook {
 /// An sRGB pixel in CIELAB (D65).
 glm::dvec3 lab_of(const std::uint8_t* pixel);
 
+/// CIEDE2000 of two colours in CIELAB. Sharma, Wu, Dalal, "The CIEDE2000 Color-Difference Formula",
+/// 2005.
+double ciede2000(const glm::dvec3& a, const glm::dvec3& b);
+
 /// Mean CIE 1976 colour difference over the pixels where both images differ from `clear`; 0 if
 /// none: outlines are for SSIM to judge. Images of one size, sRGB.
 double mean_delta_e(const RgbaImage& a, const RgbaImage& b,

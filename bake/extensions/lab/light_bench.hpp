@@ -54,10 +54,6 @@ Result<std::vector<std::string>> make_reflecting_subjects(const std::string& fol
 /// Pictures of one height, side by side, or of one width, one below the other.
 RgbaImage joined(const std::vector<RgbaImage>& images, bool across);
 
-/// CIEDE2000 of two colours in CIELAB. Sharma, Wu, Dalal, "The CIEDE2000 Color-Difference Formula",
-/// 2005.
-double ciede2000(const glm::dvec3& a, const glm::dvec3& b);
-
 /// Writes plant.obj (crossed cards with a picture of leaves, in a pot) and glass.obj (a bowl that
 /// is half transparent, a ball in it) with their materials and pictures into a folder that exists,
 /// and answers their paths. z is up. Errors: kIo "io.write".

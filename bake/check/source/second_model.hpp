@@ -1,0 +1,45 @@
+// A model as the second reader reads it: what its program hands to the checker.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include "bake/image/image.hpp"
+
+namespace modar {
+
+/// Colours are sRGB, 0 to 1.
+struct SecondMaterial {
+  glm::dvec4 colour{229.0 / 255, 229.0 / 255, 229.0 / 255, 1};
+  glm::dvec3 emission{0};
+  std::array<Wrap, 2> wrap{Wrap::kRepeat, Wrap::kRepeat};  ///< along u, v
+  RgbaImage picture;                                       ///< without pixels: none
+};
+
+struct SecondCorner {
+  glm::dvec3 position{0};  ///< source units
+  glm::dvec3 normal{0};    ///< unit length
+  glm::dvec2 uv{0};        ///< v down
+  glm::dvec3 colour{1};
+};
+
+struct SecondModel {
+  bool knows_colours = true;  ///< false: the file states some that this reader does not know
+  std::vector<std::array<SecondCorner, 3>> triangles;
+  std::vector<std::uint32_t> triangle_material;
+  std::vector<SecondMaterial> materials;
+};
+
+/// The program's output. Its reader is the same version: the bytes are checked for their length
+/// alone.
+std::string write_second(const SecondModel& model);
+/// False where the bytes end early.
+bool read_second(const std::string& bytes, SecondModel& model);
+
+}  // namespace modar
