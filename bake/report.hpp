@@ -2,6 +2,7 @@
 // --json and the summary all read this one stream.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -68,6 +69,45 @@ struct MeshTopology {
   }
 };
 
+/// Defects of meshes, in the order of kDefectNames.
+enum class Defect : std::uint8_t {
+  kDegenerate,  ///< triangles without area
+  kDuplicate,   ///< triangles over the positions of another
+  kEdge,        ///< edges of more than two triangles
+  kVertex,      ///< positions where fans of triangles touch
+  kWinding,     ///< edges of two triangles that wind against each other; repaired: triangles
+  kIsland,      ///< small parts
+  kHole         ///< small ones
+};
+/// Keys of documents (json.md).
+inline constexpr std::array kDefectNames = {
+    "degenerate", "duplicates", "non_manifold_edges", "touching_vertices", "winding",
+    "islands",    "holes"};
+inline constexpr std::size_t kDefects = kDefectNames.size();
+/// For people, after a number.
+inline const char* defect_words(Defect defect) {
+  constexpr std::array<const char*, kDefects> kWords = {"triangles without area",
+                                                        "repeated triangles",
+                                                        "non-manifold edges",
+                                                        "vertices where parts touch",
+                                                        "changes of winding",
+                                                        "small islands",
+                                                        "small holes"};
+  return kWords[static_cast<std::size_t>(defect)];
+}
+
+struct DefectCount {
+  std::uint64_t count = 0;
+  double area = 0;  ///< of the triangles, or of the hole; square source units
+};
+
+/// How many defects a mesh has, or had before they were repaired.
+struct MeshDefects {
+  std::string model;  ///< its name
+  std::array<DefectCount, kDefects> counts{};
+  [[nodiscard]] DefectCount& of(Defect defect) { return counts[static_cast<std::size_t>(defect)]; }
+};
+
 /// What a model's levels of detail are off by, the worst of all.
 struct LevelFigures {
   double position_error_max = 0;   ///< source units: bounds the distance from level 0
@@ -79,6 +119,8 @@ struct Report {
   std::vector<StageReport> stages;
   std::vector<Diagnostic> diagnostics;
   std::vector<MeshTopology> topologies;  ///< one a model, where requested
+  std::vector<MeshDefects> defects;      ///< one a model, after its repair
+  std::vector<MeshDefects> repairs;      ///< one a model, where requested
   std::vector<LevelFigures> levels;      ///< one a model, where levels were requested
   std::vector<Upright> uprights;         ///< one a model
   ProgressCallback progress;             ///< may be empty

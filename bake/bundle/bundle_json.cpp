@@ -135,6 +135,7 @@ Json model_json(const BundleView& bundle, std::uint32_t index) {
     materials.push_back(bundle.name(bundle.materials()[model.first_material + m].name));
   }
   const std::optional<MeshTopology> topology = stated_topology(bundle, index);
+  const std::optional<MeshDefects> repair = stated_repair(bundle, index);
   const std::optional<LevelFigures> levels = stated_levels(bundle, index);
   const std::optional<Upright> upright = stated_upright(bundle, index);
   Json level_figures = levels ? level_json(*levels) : Json();
@@ -163,6 +164,7 @@ Json model_json(const BundleView& bundle, std::uint32_t index) {
           {"uv_error_rms_texels", model.uv_error_rms_texels},
           {"up", upright ? upright_json(*upright) : Json()},
           {"topology", topology ? topology_json(*topology) : Json()},
+          {"repair", repair ? defects_json(*repair) : Json()},
           {"levels", std::move(level_figures)}};
 }
 
@@ -188,6 +190,15 @@ Json texture_json(const BundleView& bundle, std::uint32_t index) {
 }
 
 }  // namespace
+
+Json defects_json(const MeshDefects& defects) {
+  Json json = Json::object();
+  for (std::size_t d = 0; d < kDefects; ++d) {
+    const DefectCount& count = defects.counts[d];
+    json.set(kDefectNames[d], Json{{"count", count.count}, {"area", count.area}});
+  }
+  return json;
+}
 
 Json range_json(const ScoreRange& range, double width_mm) {
   return {{"nearest_widths", range.nearest},
@@ -270,6 +281,9 @@ std::string bundle_meta(const BakeRequest& request, const Report& report, const 
     if (models.size() < report.topologies.size()) {
       model.set("topology", topology_json(report.topologies[models.size()]));
     }
+    if (models.size() < report.repairs.size()) {
+      model.set("repair", defects_json(report.repairs[models.size()]));
+    }
     if (models.size() < report.levels.size()) {
       model.set("levels", level_json(report.levels[models.size()]));
     }
@@ -322,6 +336,18 @@ std::optional<MeshTopology> stated_topology(const BundleView& bundle, std::uint3
   return topology;
 }
 
+std::optional<MeshDefects> stated_repair(const BundleView& bundle, std::uint32_t model) {
+  const std::optional<Json> found = stated(bundle, model, "repair");
+  if (!found) return std::nullopt;
+  MeshDefects repair;
+  for (std::size_t d = 0; d < kDefects; ++d) {
+    const Json one = found->find(kDefectNames[d]).value_or(Json());
+    repair.counts[d].count = one.find("count").value_or(0).count().value_or(0);
+    repair.counts[d].area = one.find("area").value_or(0).number().value_or(0);
+  }
+  return repair;
+}
+
 std::optional<LevelFigures> stated_levels(const BundleView& bundle, std::uint32_t model) {
   const std::optional<Json> found = stated(bundle, model, "levels");
   const std::optional<Json> error = found ? found->find("position_error_max") : std::nullopt;
@@ -350,6 +376,20 @@ std::string topology_words(const MeshTopology& t) {
          " boundary loops, Euler number " + std::to_string(t.euler()) +
          ", non-manifold: " + std::to_string(t.non_manifold_edges) + " edges, " +
          std::to_string(t.non_manifold_vertices) + " vertices";
+}
+
+std::string repair_words(const MeshDefects& repair) {
+  std::string words;
+  for (std::size_t d = 0; d < kDefects; ++d) {
+    const DefectCount& one = repair.counts[d];
+    if (one.count == 0) continue;
+    char text[96];
+    std::snprintf(text, sizeof text, "%s%llu %s (area %.3g)", words.empty() ? "repaired: " : ", ",
+                  static_cast<unsigned long long>(one.count), defect_words(static_cast<Defect>(d)),
+                  one.area);
+    words += text;
+  }
+  return words.empty() ? "nothing to repair" : words;
 }
 
 std::string length_words(double source_units, const ModelRecord& model) {

@@ -19,9 +19,10 @@ namespace modar {
 /// The report of the models and the trace of the patterns are next to each.
 std::string bundle_meta(const BakeRequest& request, const Report& report, const BakeTrace& trace);
 
-/// What the bundle states of a model's topology and of its levels of detail. Nothing where it was
-/// baked without them, or by others.
+/// What the bundle states of a model's topology, its repair and its levels of detail. Nothing where
+/// it was baked without them, or by others.
 std::optional<MeshTopology> stated_topology(const BundleView& bundle, std::uint32_t model);
+std::optional<MeshDefects> stated_repair(const BundleView& bundle, std::uint32_t model);
 std::optional<LevelFigures> stated_levels(const BundleView& bundle, std::uint32_t model);
 
 /// Which axis of the model is up, and how that is known. Nothing of bundles that do not state it.
@@ -47,6 +48,8 @@ std::optional<StatedPlacement> stated_placement(const BundleView& bundle, std::u
 
 /// "3 components, 1 boundary loop, ...": for people.
 std::string topology_words(const MeshTopology& topology);
+/// "repaired: 3 small islands (area 0.02), ...": in square units of the file.
+std::string repair_words(const MeshDefects& repair);
 /// "6 levels of detail, down to 1328 triangles"; empty where a model has one, or states none.
 std::string level_words(const BundleView& bundle, std::uint32_t model);
 /// "0.42 mm (0.01 % of its diagonal)".
@@ -56,6 +59,9 @@ std::string scene_words(const BundleView& bundle, std::uint32_t scene);
 
 /// "findings" of the documents.
 Json diagnostics_json(const std::vector<Diagnostic>& diagnostics);
+
+/// Counts by the names of kDefectNames, and areas where they are known: of repairs.
+Json defects_json(const MeshDefects& defects);
 
 /// All that a bundle holds: the document of `modar inspect --json`.
 Json bundle_json(const BundleView& bundle);

@@ -135,6 +135,9 @@ void print_summary(const BundleView& bundle, const Report& report, const std::st
     if (const auto topology = stated_topology(bundle, m)) {
       std::fprintf(stderr, "        %s\n", topology_words(*topology).c_str());
     }
+    if (const auto repair = stated_repair(bundle, m)) {
+      std::fprintf(stderr, "        %s\n", repair_words(*repair).c_str());
+    }
     if (const std::string levels = level_words(bundle, m); !levels.empty()) {
       std::fprintf(stderr, "        %s\n", levels.c_str());
     }
@@ -189,9 +192,15 @@ Json bake_json(const BundleView& bundle, const Report& report) {
                           {"copied_faces", topology.half_edges->copied_faces},
                           {"copied_vertices", topology.half_edges->copied_vertices}});
   }
+  const Json defects = Json::list(report.defects, [](const MeshDefects& one) -> Json {
+    Json json = defects_json(one);
+    json.set("model", one.model);
+    return json;
+  });
   const ProcessCost cost = process_cost();
   return {{"bundle", bundle_json(bundle)},
           {"half_edges", half_edges},
+          {"defects", defects},
           {"stages", stages},
           {"findings", diagnostics_json(report.diagnostics)},
           {"cpu_seconds", cost.cpu_seconds},

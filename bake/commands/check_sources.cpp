@@ -145,6 +145,7 @@ Result<std::vector<ModelLook>> compare_looks(const BundleView& bundle, const Che
   options.picture_folder = command.visual;
   options.jobs = command.jobs;
   options.crease = request.crease_degrees();
+  options.repair = request.repair;
   ProgressBar bar(command.json || command.sarif);
   options.progress = [&bar](double done) { bar.show("look", done); };
   return check_looks(bundle, options, sink);

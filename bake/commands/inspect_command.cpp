@@ -36,6 +36,9 @@ void print_models(const BundleView& bundle) {
     if (const auto topology = stated_topology(bundle, m)) {
       std::printf("  %s\n", topology_words(*topology).c_str());
     }
+    if (const auto repair = stated_repair(bundle, m)) {
+      std::printf("  %s\n", repair_words(*repair).c_str());
+    }
     if (const std::string levels = level_words(bundle, m); !levels.empty()) {
       std::printf("  %s\n", levels.c_str());
     }

@@ -207,6 +207,11 @@ constexpr BakeOption kOptions[] = {
     {"--smooth", "smooth", Part::kModel, Group::kGeometry, nullptr, "true",
      "Smooth all edges where the file states no normals and no smoothing groups",
      TruthOption{[](BakeRequest& r) -> bool& { return r.smooth; }}},
+    {"--repair", "repair", Part::kModel, Group::kGeometry, nullptr, "true",
+     "Repair scans: remove small islands and repeated triangles, split non-manifold edges, make "
+     "the "
+     "winding consistent, close small holes",
+     TruthOption{[](BakeRequest& r) -> bool& { return r.repair; }, true}},
 };
 
 /// Whether the flags are "--" or "--no-" and the name.
@@ -393,7 +398,9 @@ Json state_options(const BakeRequest& request) {
   for (const BakeOption& option : kOptions) {
     std::visit(
         Each{
-            [&](const TruthOption& truth) { options.set(option.name, truth.at(own)); },
+            [&](const TruthOption& truth) {
+              if (truth.at(own) || !truth.quiet) options.set(option.name, truth.at(own));
+            },
             [&](const NumberOption& number) { options.set(option.name, number.at(own)); },
             [&](const WordOption& word) {
               const int chosen = word.get(own);

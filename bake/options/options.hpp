@@ -25,6 +25,7 @@ enum class OptionGroup : std::uint8_t { kTarget, kGeometry, kTextures, kPatterns
 /// True or false.
 struct TruthOption {
   bool& (*at)(BakeRequest&);
+  bool quiet = false;  ///< the meta text states it only where it is on
 };
 
 /// A whole number within limits.

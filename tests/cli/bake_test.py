@@ -156,6 +156,26 @@ class Bake(ProgramTest):
         without = self.modar_json("bake", "--model", STATUE, "--no-lods", "--no-occlusion", "-o", out)
         self.assertIsNone(without["bundle"]["models"][0]["topology"])
 
+    def test_defects_are_counted_and_repaired_where_requested(self):
+        lines = [line for line in STATUE.read_text().splitlines() if not line.startswith("f ")]
+        faces = [line for line in STATUE.read_text().splitlines() if line.startswith("f ")]
+        words = faces[0].split()
+        turned = " ".join([words[0], words[1], words[3], words[2]])
+        model = self.folder / "worn.obj"
+        model.write_text("\n".join(lines + [turned] + faces[1:] + [faces[9]]) + "\n")
+        out = self.folder / "worn.modar"
+        plain = self.modar("bake", "--model", model, "--no-lods", "--no-occlusion", "-o", out)
+        self.assertIn("1 repeated triangles", plain.stderr)
+        self.assertIn("--repair", plain.stderr)
+        report = self.modar_json("bake", "--model", model, "--no-lods", "--no-occlusion", "--repair", "-o", out)
+        done = report["bundle"]["models"][0]["repair"]
+        self.assertEqual((done["duplicates"]["count"], done["winding"]["count"]), (1, 1))
+        self.assertGreater(done["winding"]["area"], 0)
+        self.assertEqual(report["defects"][0]["duplicates"]["count"], 0)
+        self.assertEqual(report["bundle"]["models"][0]["triangles"], len(faces))
+        self.assertIn("repaired: ", self.modar("inspect", out).stdout)
+        self.assertEqual(self.modar("check", out, "--source", model).returncode, 0)
+
     def test_models_only_and_patterns_only_are_legal(self):
         picture(self.folder / "picture.png")
         for arguments in (["--model", STATUE, "--no-occlusion"], ["--pattern", "picture.png", *QUICK]):

@@ -18,6 +18,7 @@
 #include "bake/check/verdict.hpp"
 #include "bake/image/difference.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/mesh/repair/repair.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/texture/relief/relief.hpp"
 #include "modar/gl_context.hpp"
@@ -146,6 +147,7 @@ class VisualComparer {
   Result<ModelLook> look(std::uint32_t index, const ModelRequest& asked) {
     Report quiet;
     MODAR_ASSIGN(SourceModel source, read_model(asked.path, {options_.jobs, asked.own_picture}));
+    if (options_.repair) repair_model(source, quiet);
     MODAR_ASSIGN(TriMesh mesh, weld(std::move(source), quiet, {options_.jobs, options_.crease}));
     const auto upright = stated_upright(bundle_, index);
     ReliefOptions relief;

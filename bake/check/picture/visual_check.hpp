@@ -25,7 +25,8 @@ struct VisualOptions {
   double least_ssim = 0.9;           ///< gates, over what shows the model
   double greatest_delta_e = 4.0;
   unsigned jobs = 1;
-  double crease = 40;                         ///< of generated normals, see WeldOptions
+  double crease = 40;   ///< of generated normals, see WeldOptions
+  bool repair = false;  ///< compare with the repaired source, see repair_model()
   std::function<void(double done)> progress;  ///< may be empty
 };
 

@@ -13,6 +13,7 @@
 #include "bake/extensions/lab/probe_peers.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
+#include "bake/mesh/repair/repair.hpp"
 #include "bake/mesh/topology/mesh_topology.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "formats/transport/chunk_order.hpp"
@@ -87,6 +88,47 @@ int probe_topology(const std::string& path, unsigned jobs) {
   return 0;
 }
 
+/// Repairs a model; writes the triangles by their positions where a file is named.
+int probe_repair(const std::string& path, unsigned repair, const std::string& output) {
+  Result<SourceModel> model = read_model(path, {1, true, ""});
+  if (!model) return complain(model.error());
+  Report report;
+  if (repair != 0) {
+    const Stopwatch watch;
+    const MeshDefects repaired = repair_model(*model, report);
+    for (std::size_t i = 0; i < kDefects; ++i) {
+      print(kDefectNames[i], static_cast<double>(repaired.counts[i].count));
+      print("  area", repaired.counts[i].area);
+    }
+  }
+  const Result<TriMesh> mesh = weld(std::move(*model), report, {1});
+  if (!mesh) return complain(mesh.error());
+  {
+    const Stopwatch watch;
+    const MeshDefects left = count_defects(*mesh, repair != 0, report);
+    for (std::size_t i = 0; i < kDefects; ++i) {
+      print(kDefectNames[i], static_cast<double>(left.counts[i].count));
+      print("  area", left.counts[i].area);
+    }
+  }
+  if (output.empty()) return 0;
+  std::FILE* const file = std::fopen(output.c_str(), "w");
+  if (file == nullptr) return 1;
+  std::vector<glm::dvec3> positions;
+  for (std::uint32_t v = 0; v < mesh->positions.size(); ++v) {
+    const std::uint32_t p = mesh->source_position(v);
+    if (p >= positions.size()) positions.resize(p + std::size_t{1});
+    positions[p] = mesh->placement.center + mesh->placement.scale * mesh->positions[v];
+  }
+  for (const glm::dvec3& p : positions) std::fprintf(file, "v %.17g %.17g %.17g\n", p.x, p.y, p.z);
+  for (const auto& t : mesh->triangles) {
+    std::fprintf(file, "f %u %u %u\n", mesh->source_position(t[0]) + 1,
+                 mesh->source_position(t[1]) + 1, mesh->source_position(t[2]) + 1);
+  }
+  std::fclose(file);
+  return 0;
+}
+
 Result<ChunkedMesh> read_and_chunk(const std::string& path, unsigned jobs) {
   MODAR_ASSIGN(TriMesh mesh, read_and_weld(path, jobs));
   Report report;
@@ -157,6 +199,7 @@ int run(const std::string& what, const std::string& path, const std::string& num
   const auto jobs = static_cast<unsigned>(std::stoull(number));
   if (what == "read") return probe_read(path, jobs);
   if (what == "topology") return probe_topology(path, jobs);
+  if (what == "repair") return probe_repair(path, jobs, output);
   if (what == "levels") return probe_levels(path, jobs);
   if (what == "order") return probe_order(path, true);
   if (what == "meshopt") return probe_order(path, false);

@@ -293,6 +293,9 @@ class Page {
     if (const auto topology = stated_topology(bundle_, index)) {
       rows += row("Shape", topology_words(*topology));
     }
+    if (const auto repair = stated_repair(bundle_, index)) {
+      rows += row("Repair", repair_words(*repair));
+    }
     return rows;
   }
 

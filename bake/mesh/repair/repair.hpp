@@ -1,0 +1,21 @@
+// Repairs scans: what repair() changes, and a count of the same defects for meshes it does not
+// change.
+#pragma once
+
+#include "bake/import/source_model.hpp"
+#include "bake/mesh/tri_mesh.hpp"
+#include "bake/report.hpp"
+
+namespace modar {
+
+/// Removes small islands and repeated triangles, splits edges and positions where more than one
+/// surface meets, turns triangles that wind against their neighbours, and closes holes of up to 1 %
+/// of the diagonal. Faces become triangles, and open
+/// edges that were written twice one. Positions, uvs, normals and colours of all others stay.
+MeshDefects repair_model(SourceModel& model, Report& report);
+
+/// How much of that a mesh has. repaired: positions that were split are not one again. Takes a
+/// hundredth of a bake.
+MeshDefects count_defects(const TriMesh& mesh, bool repaired, Report& report);
+
+}  // namespace modar
