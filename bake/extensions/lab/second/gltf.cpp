@@ -71,7 +71,7 @@ std::string decode_base64(std::string_view text) {
 
 class GltfReader {
  public:
-  GltfReader(const std::string& path, Json json, std::string binary)
+  GltfReader(const std::string& path, Json json, const std::string& binary)
       : path_(path), json_(std::move(json)) {
     for (const Json& buffer : list(json_, "buffers")) {
       const std::string uri = text(buffer, "uri");
