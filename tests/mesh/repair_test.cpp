@@ -74,16 +74,17 @@ Shape pillow(int n) {
 }
 
 /// Defects of faces, each by its definition.
-struct Brute {
+struct CountedDefects {
   std::size_t edges = 0, winding = 0, repeated = 0, touching = 0, open = 0;
-  Brute(const std::vector<std::array<std::uint32_t, 3>>& faces) {  // NOLINT: a count of faces
+  CountedDefects(
+      const std::vector<std::array<std::uint32_t, 3>>& faces) {  // NOLINT: a count of faces
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<bool>> walks;
     std::map<std::uint32_t, std::vector<std::set<std::uint32_t>>> fans;
     std::set<std::array<std::uint32_t, 3>> seen;
     for (const auto& f : faces) {
       std::array<std::uint32_t, 3> sorted = f;
       std::sort(sorted.begin(), sorted.end());
-      repeated += seen.insert(sorted).second ? 0 : 1;
+      repeated += seen.insert(sorted).second ? 0u : 1u;
       for (std::size_t i = 0; i < 3; ++i) {
         const std::uint32_t a = f[i], b = f[(i + 1) % 3], c = f[(i + 2) % 3];
         walks[std::minmax(a, b)].push_back(a < b);
@@ -98,11 +99,11 @@ struct Brute {
       }
     }
     for (const auto& [edge, up] : walks) {
-      edges += up.size() > 2 ? 1 : 0;
-      open += up.size() == 1 ? 1 : 0;
-      winding += up.size() == 2 && up[0] == up[1] ? 1 : 0;
+      edges += up.size() > 2 ? 1u : 0u;
+      open += up.size() == 1 ? 1u : 0u;
+      winding += up.size() == 2 && up[0] == up[1] ? 1u : 0u;
     }
-    for (const auto& [vertex, around] : fans) touching += around.size() > 1 ? 1 : 0;
+    for (const auto& [vertex, around] : fans) touching += around.size() > 1 ? 1u : 0u;
   }
 };
 
@@ -136,7 +137,7 @@ Repaired repair(const Shape& shape) {
 }
 
 void expect_clean(Repaired& result) {
-  const Brute brute(faces_of(result.mesh));
+  const CountedDefects brute(faces_of(result.mesh));
   EXPECT_EQ(brute.edges + brute.winding + brute.repeated + brute.touching, 0u);
   for (const DefectCount& count : result.left.counts) EXPECT_EQ(count.count, 0u);
 }
@@ -165,7 +166,7 @@ TEST(Repair, TurnsTrianglesAndRemovesRepeatedOnes) {
   std::swap(shape.faces[300][1], shape.faces[300][2]);
   shape.faces.push_back({shape.faces[7][1], shape.faces[7][2], shape.faces[7][0]});
   const TriMesh plain = testing::welded(testing::parse(shape.obj()));
-  const Brute brute(faces_of(plain));
+  const CountedDefects brute(faces_of(plain));
   Repaired result = repair(shape);
   EXPECT_EQ(result.found(Defect::kWinding), brute.winding);
   EXPECT_EQ(result.found(Defect::kDuplicate), 1u);
@@ -173,7 +174,7 @@ TEST(Repair, TurnsTrianglesAndRemovesRepeatedOnes) {
   EXPECT_EQ(result.repaired(Defect::kWinding), 2u);
   EXPECT_EQ(result.repaired(Defect::kDuplicate), 1u);
   expect_clean(result);
-  EXPECT_EQ(Brute(faces_of(result.mesh)).open, 0u);
+  EXPECT_EQ(CountedDefects(faces_of(result.mesh)).open, 0u);
 }
 
 TEST(Repair, SplitsFinsAndTouchingParts) {
@@ -182,9 +183,12 @@ TEST(Repair, SplitsFinsAndTouchingParts) {
   shape.faces.push_back({f[0], f[1], shape.at(30, 30, 60)});  // a third triangle at an edge
   const int tip = shape.faces[410][0];                        // a cone that touches a vertex
   std::array<int, 8> rim{};
-  for (int i = 0; i < 8; ++i) rim[i] = shape.at(20 * std::cos(i), 20 * std::sin(i), 70 + i);
-  for (int i = 0; i < 7; ++i) shape.faces.push_back({tip, rim[i], rim[i + 1]});
-  const Brute brute(faces_of(testing::welded(testing::parse(shape.obj()))));
+  for (std::size_t i = 0; i < 8; ++i) {
+    const auto angle = static_cast<double>(i);
+    rim[i] = shape.at(20 * std::cos(angle), 20 * std::sin(angle), 70 + angle);
+  }
+  for (std::size_t i = 0; i < 7; ++i) shape.faces.push_back({tip, rim[i], rim[i + 1]});
+  const CountedDefects brute(faces_of(testing::welded(testing::parse(shape.obj()))));
   Repaired result = repair(shape);
   EXPECT_EQ(brute.edges, 1u);
   EXPECT_EQ(brute.touching, 1u);
@@ -210,7 +214,7 @@ TEST(Repair, ClosesSmallHolesOnly) {
   EXPECT_EQ(result.repaired(Defect::kHole), 1u);
   EXPECT_NEAR(result.done.of(Defect::kHole).area, 1, 1e-9);
   expect_clean(result);
-  EXPECT_EQ(Brute(faces_of(result.mesh)).open, 40u);  // the rim of the large one
+  EXPECT_EQ(CountedDefects(faces_of(result.mesh)).open, 40u);  // the rim of the large one
   const TriMesh& mesh = result.mesh;
   const std::size_t last = mesh.triangles.size() - 1;  // its colour is that around it
   for (const std::uint32_t v : mesh.triangles[last]) {
@@ -267,24 +271,24 @@ TEST(Repair, JoinsSeamsThatWereWrittenTwice) {
   for (std::size_t t = 0; t < shape.faces.size() / 2; ++t) {
     for (int& v : shape.faces[t]) v += count;
   }
-  EXPECT_GT(Brute(faces_of(testing::welded(testing::parse(shape.obj())))).open, 0u);
+  EXPECT_GT(CountedDefects(faces_of(testing::welded(testing::parse(shape.obj())))).open, 0u);
   Repaired result = repair(shape);
   for (const DefectCount& found : result.before.counts) EXPECT_EQ(found.count, 0u);
-  EXPECT_EQ(Brute(faces_of(result.mesh)).open, 0u);
+  EXPECT_EQ(CountedDefects(faces_of(result.mesh)).open, 0u);
 }
 
 TEST(Repair, MakesAStripOfOneSideTwoSided) {
   Shape shape;  // a Moebius strip of 30 squares
   std::array<std::array<int, 2>, 30> rungs{};
-  for (int i = 0; i < 30; ++i) {
-    const double t = 2 * 3.14159265358979 * i / 30;
-    for (const int side : {0, 1}) {
+  for (std::size_t i = 0; i < 30; ++i) {
+    const double t = 2 * 3.14159265358979 * static_cast<double>(i) / 30;
+    for (const unsigned side : {0u, 1u}) {
       const double w = (side == 0 ? -1 : 1) * 3.0;
       rungs[i][side] = shape.at((10 + w * std::cos(t / 2)) * std::cos(t),
                                 (10 + w * std::cos(t / 2)) * std::sin(t), w * std::sin(t / 2));
     }
   }
-  for (int i = 0; i < 30; ++i) {
+  for (std::size_t i = 0; i < 30; ++i) {
     const bool last = i == 29;
     const int c = rungs[(i + 1) % 30][last ? 0 : 1], d = rungs[(i + 1) % 30][last ? 1 : 0];
     shape.faces.push_back({rungs[i][0], rungs[i][1], c});

@@ -30,7 +30,7 @@ struct Counted {
     }
     positions = std::span(own.data(), own.size());
   }
-  [[nodiscard]] Surface surface() const {
+  [[nodiscard]] Faces surface() const {
     return {std::span(corners.data(), corners.size()), positions};
   }
 
@@ -39,7 +39,7 @@ struct Counted {
   std::span<const glm::dvec3> positions;
 };
 
-Array<std::uint8_t> clean_positions(const Surface& surface, const Around& around) {
+Array<std::uint8_t> clean_positions(const Faces& surface, const Around& around) {
   Array<std::uint8_t> clean(surface.positions.size());
   for (std::uint32_t v = 0; v < clean.size(); ++v) {
     clean[v] = regular(surface, around.at(v)) ? 1 : 0;
@@ -49,7 +49,7 @@ Array<std::uint8_t> clean_positions(const Surface& surface, const Around& around
 
 class Counter {
  public:
-  Counter(const Surface& surface, const Around& around, const Array<std::uint8_t>& clean,
+  Counter(const Faces& surface, const Around& around, const Array<std::uint8_t>& clean,
           MeshDefects& defects)
       : surface_(surface), around_(around), clean_(clean), defects_(defects) {}
 
@@ -112,19 +112,19 @@ class Counter {
   }
 
   /// Boxes of open edges that touch, by their lowest positions.
-  [[nodiscard]] std::map<std::uint32_t, Box> loops() const {
+  [[nodiscard]] std::map<std::uint32_t, PointBox> loops() const {
     Sets sets(surface_.positions.size());
     for (const std::uint32_t h : open_) sets.join(surface_.corners[h], surface_.corners[next(h)]);
-    std::map<std::uint32_t, Box> loops;
+    std::map<std::uint32_t, PointBox> loops;
     for (const std::uint32_t h : open_) {
-      Box& box = loops[sets.root(surface_.corners[h])];
+      PointBox& box = loops[sets.root(surface_.corners[h])];
       box.add(surface_.at(h));
       box.add(surface_.at(next(h)));
     }
     return loops;
   }
 
-  const Surface& surface_;
+  const Faces& surface_;
   const Around& around_;
   const Array<std::uint8_t>& clean_;
   MeshDefects& defects_;

@@ -34,7 +34,7 @@ void close(Triangles& triangles, const std::vector<std::uint32_t>& border, Defec
 }  // namespace
 
 void close_holes(Triangles& triangles, DefectCount& count) {
-  const Surface surface = triangles.surface();
+  const Faces surface = triangles.surface();
   const std::vector<std::uint32_t> open = open_edges(surface, Around(surface));
   const Components components(surface, open);
   Array<std::uint32_t> out(surface.positions.size(), kNone);  // the open half-edge from a position
@@ -44,7 +44,7 @@ void close_holes(Triangles& triangles, DefectCount& count) {
   for (const std::uint32_t first : open) {
     if (out[surface.corners[first]] != first) continue;
     border.clear();
-    Box box;
+    PointBox box;
     for (std::uint32_t h = first; h != kNone;) {
       border.push_back(h);
       box.add(surface.at(h));
@@ -52,7 +52,7 @@ void close_holes(Triangles& triangles, DefectCount& count) {
       h = out[surface.corners[next(h)]];
     }
     const bool loop = surface.corners[next(border.back())] == surface.corners[first];
-    const Box& part = components.at(components.of(surface.corners[first])).box;
+    const PointBox& part = components.at(components.of(surface.corners[first])).box;
     if (loop && border.size() > 2 && small_hole(box, part)) holes.push_back(border);
   }
   for (const auto& hole : holes) close(triangles, hole, count);

@@ -24,7 +24,7 @@ class Links {
 
  private:
   void pair() {
-    const Surface surface = triangles_.surface();
+    const Faces surface = triangles_.surface();
     const Around around(surface);
     for_each_edge(
         surface, around, [](std::uint32_t) { return true; },
@@ -55,7 +55,7 @@ class Links {
 
   /// Joins the flattest pair first, of one winding where it can. Both sides of one triangle never.
   void pair_at(std::span<const std::uint32_t> edge) {
-    const Surface surface = triangles_.surface();
+    const Faces surface = triangles_.surface();
     struct Pair {
       double fold;
       std::uint32_t a, b;
@@ -96,7 +96,7 @@ class Links {
 
   /// Turns the smaller part of each surface that does not wind as the rest.
   void orient() {
-    const Surface surface = triangles_.surface();
+    const Faces surface = triangles_.surface();
     std::vector<std::uint8_t> state(surface.triangles(), 0);  // 1: stays, 2: to be turned
     std::vector<std::uint32_t> part;
     for (std::uint32_t start = 0; start < state.size(); ++start) {
@@ -172,7 +172,7 @@ class Links {
 
   /// Parts what still shares an edge with a third: a fan may meet itself. apart: from all others.
   bool cut_crowded(bool apart) {
-    const Surface surface = triangles_.surface();
+    const Faces surface = triangles_.surface();
     bool any = false;
     for_each_edge(
         surface, Around(surface), [](std::uint32_t) { return true; },

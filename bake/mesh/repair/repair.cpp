@@ -46,7 +46,7 @@ void remove_flat(Triangles& triangles, DefectCount& count) {
 
 /// Keeps the first of triangles that have the same positions in the same winding.
 void remove_repeated(Triangles& triangles, DefectCount& count) {
-  const Surface surface = triangles.surface();
+  const Faces surface = triangles.surface();
   const Around around(surface);
   Removal removal(triangles);
   for (std::uint32_t v = 0; v < surface.positions.size(); ++v) {
@@ -58,7 +58,7 @@ void remove_repeated(Triangles& triangles, DefectCount& count) {
 
 /// Returns whether there were too many to be removed.
 bool remove_islands(Triangles& triangles, DefectCount& count) {
-  const Surface surface = triangles.surface();
+  const Faces surface = triangles.surface();
   Components components(surface, open_edges(surface, Around(surface)));
   bool many = false;
   const std::vector<bool> small = components.islands(many);

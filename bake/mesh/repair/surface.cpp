@@ -20,7 +20,7 @@ constexpr double kHoleDiagonal = 0.01;
 
 }  // namespace
 
-Around::Around(const Surface& surface)
+Around::Around(const Faces& surface)
     : first(surface.positions.size() + 1, 0), corners(surface.corners.size()) {
   for (const std::uint32_t v : surface.corners) ++first[v + std::size_t{1}];
   for (std::size_t v = 1; v < first.size(); ++v) first[v] += first[v - 1];
@@ -28,7 +28,7 @@ Around::Around(const Surface& surface)
   for (std::uint32_t c = 0; c < surface.corners.size(); ++c) corners[at[surface.corners[c]]++] = c;
 }
 
-bool regular(const Surface& surface, std::span<const std::uint32_t> corners) {
+bool regular(const Faces& surface, std::span<const std::uint32_t> corners) {
   constexpr std::size_t kMost = 16;  // of corners; longer fans take quadratic time
   if (corners.size() < 3 || corners.size() > kMost) return false;
   std::array<std::array<std::uint32_t, 2>, kMost> links;  // positions ahead and behind
@@ -51,7 +51,7 @@ bool regular(const Surface& surface, std::span<const std::uint32_t> corners) {
   return links[corners.size() - 1][1] == links[0][0];
 }
 
-Components::Components(const Surface& surface, std::span<const std::uint32_t> open)
+Components::Components(const Faces& surface, std::span<const std::uint32_t> open)
     : surface_(surface), part_(surface.positions.size(), kNone) {
   Sets sets(part_.size());
   for (std::size_t c = 0; c < surface.corners.size(); c += 3) {
@@ -78,7 +78,7 @@ void Components::add(std::uint32_t position, std::uint32_t root) {
 
 std::vector<bool> Components::islands(bool& many) {
   const auto triangles = static_cast<double>(surface_.triangles());
-  Box box;
+  PointBox box;
   std::vector<bool> debris;
   for (const Part& each : parts_) {
     const auto own = static_cast<double>(each.triangles);
@@ -110,7 +110,7 @@ std::vector<bool> Components::islands(bool& many) {
   return debris;
 }
 
-bool small_hole(const Box& loop, const Box& part) {
+bool small_hole(const PointBox& loop, const PointBox& part) {
   return loop.diagonal() <= kHoleDiagonal * part.diagonal();
 }
 

@@ -27,7 +27,7 @@ inline std::uint32_t previous(std::uint32_t h) {
 }
 
 /// Box of points.
-struct Box {
+struct PointBox {
   glm::dvec3 low{std::numeric_limits<double>::infinity()};
   glm::dvec3 high{-std::numeric_limits<double>::infinity()};
   void add(const glm::dvec3& p) {
@@ -38,7 +38,7 @@ struct Box {
 };
 
 /// Positions of triangles, three corners each. Does not own them.
-struct Surface {
+struct Faces {
   std::span<const std::uint32_t> corners;
   std::span<const glm::dvec3> positions;
 
@@ -56,7 +56,7 @@ struct Surface {
 
 /// The corners at each position.
 struct Around {
-  explicit Around(const Surface& surface);
+  explicit Around(const Faces& surface);
   [[nodiscard]] std::span<const std::uint32_t> at(std::uint32_t position) const {
     return {corners.data() + first[position], first[position + std::size_t{1}] - first[position]};
   }
@@ -66,7 +66,7 @@ struct Around {
 
 /// Calls visit(half-edges) once for each edge whose lower end is wanted: wanted(position).
 template <class Wanted, class Visit>
-void for_each_edge(const Surface& surface, const Around& around, const Wanted& wanted,
+void for_each_edge(const Faces& surface, const Around& around, const Wanted& wanted,
                    const Visit& visit) {
   std::vector<std::array<std::uint32_t, 2>> spokes;  // the other end, half-edge
   std::vector<std::uint32_t> edge;
@@ -93,7 +93,7 @@ void for_each_edge(const Surface& surface, const Around& around, const Wanted& w
 /// Calls visit(corner) for triangles that repeat another one in its winding, of those around the
 /// lowest of their positions.
 template <class Visit>
-void each_repeated(const Surface& surface, std::span<const std::uint32_t> corners,
+void each_repeated(const Faces& surface, std::span<const std::uint32_t> corners,
                    std::uint32_t position, const Visit& visit) {
   std::vector<std::array<std::uint32_t, 3>> others;  // positions ahead and behind, corner
   for (const std::uint32_t c : corners) {
@@ -108,11 +108,11 @@ void each_repeated(const Surface& surface, std::span<const std::uint32_t> corner
 }
 
 /// Whether a position's triangles are one closed fan of one winding: it has no defect.
-bool regular(const Surface& surface, std::span<const std::uint32_t> corners);
+bool regular(const Faces& surface, std::span<const std::uint32_t> corners);
 
 /// The half-edges that no other triangle has, of wanted positions.
 template <class Wanted>
-std::vector<std::uint32_t> open_edges(const Surface& surface, const Around& around,
+std::vector<std::uint32_t> open_edges(const Faces& surface, const Around& around,
                                       const Wanted& wanted) {
   std::vector<std::uint32_t> open;
   for_each_edge(surface, around, wanted, [&](std::span<const std::uint32_t> edge) {
@@ -120,7 +120,7 @@ std::vector<std::uint32_t> open_edges(const Surface& surface, const Around& arou
   });
   return open;
 }
-inline std::vector<std::uint32_t> open_edges(const Surface& surface, const Around& around) {
+inline std::vector<std::uint32_t> open_edges(const Faces& surface, const Around& around) {
   return open_edges(surface, around, [](std::uint32_t) { return true; });
 }
 
@@ -130,7 +130,7 @@ template <class Alike>
 std::size_t join_open_edges(std::span<std::uint32_t> corners, std::span<const glm::dvec3> positions,
                             const Around& around, const Array<std::uint8_t>& clean,
                             const Alike& alike) {
-  const Surface surface{corners, positions};
+  const Faces surface{corners, positions};
   std::vector<std::uint32_t> open;
   for (const std::uint32_t h :
        open_edges(surface, around, [&](std::uint32_t v) { return clean[v] == 0; })) {
@@ -183,13 +183,13 @@ class Sets {
 class Components {
  public:
   struct Part {
-    Box box;
+    PointBox box;
     std::uint64_t triangles = 0;
     std::uint64_t open = 0;  ///< edges
     double area = 0;         ///< once islands() has asked
   };
   /// open: half-edges.
-  Components(const Surface& surface, std::span<const std::uint32_t> open);
+  Components(const Faces& surface, std::span<const std::uint32_t> open);
   [[nodiscard]] std::uint32_t of(std::uint32_t position) const { return part_[position]; }
   [[nodiscard]] const Part& at(std::size_t number) const { return parts_[number]; }
   /// Whether each part is debris: small, and open or of few triangles. None where the model has no
@@ -199,12 +199,12 @@ class Components {
  private:
   void add(std::uint32_t position, std::uint32_t root);
 
-  Surface surface_;
+  Faces surface_;
   Array<std::uint32_t> part_;  // of each position
   std::vector<Part> parts_;    // that have triangles, in the order of these
 };
 
 /// Whether an open loop is a hole of a part, and not its rim.
-bool small_hole(const Box& loop, const Box& part);
+bool small_hole(const PointBox& loop, const PointBox& part);
 
 }  // namespace modar::repair

@@ -13,7 +13,7 @@ class Triangles {
   explicit Triangles(SourceModel& model);
   void finish();
 
-  [[nodiscard]] Surface surface() const {
+  [[nodiscard]] Faces surface() const {
     return {std::span(model_.corner_positions.data(), model_.corner_positions.size()),
             std::span(model_.positions.data(), model_.positions.size())};
   }
