@@ -588,10 +588,6 @@ void advise(const char* const (&advices)[9], PatternScore& score) {
   worst->advice = advices[worst - score.causes.begin()];
 }
 
-/// Points that texture is behind its possible causes: lower names symptoms, higher hides plain
-/// print.
-constexpr int kFollows = 25;
-
 constexpr int kOverlayCells = 12;  // on the longer side
 
 /// Darkens cells without a feature.
@@ -661,14 +657,6 @@ Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std
     }
   }
   return out;
-}
-
-const ScoreCause& first_cause(const PatternScore& score) {
-  const auto rank = [](const ScoreCause& one) {
-    const std::string_view id = one.id;
-    return one.value + (id == "texture" || id == "spread" ? kFollows : 0);
-  };
-  return *std::ranges::min_element(score.causes, {}, rank);
 }
 
 double range_value(const ScoreRange& range) {

@@ -42,10 +42,6 @@ struct PatternScore {
   int views = 0;  ///< test views
 };
 
-/// The worst cause. Texture and spread are named after what makes features few: faint or blurred
-/// print, repetition.
-const ScoreCause& first_cause(const PatternScore& score);
-
 /// Renders the picture, flat, smaller and smaller and more and more tilted, in fixed views, and
 /// runs the device's tracker on them: the range is where it is right, and the grade and the score
 /// follow from the range alone. The causes come from the picture and from the features that are
