@@ -418,8 +418,7 @@ Result<void> require_pattern_size(int width, int height) {
   const auto [shorter, longer] = std::minmax(width, height);
   if (shorter >= kSmallestSide && longer <= kLargestSide) return {};
   return fail(ExitCode::kInvalidInput, "pattern.loop-size", "",
-              "the picture has " + std::to_string(width) + "x" + std::to_string(height) +
-                  " pixels, and each side needs 32 to 1023",
+              "each side of the picture needs 32 to 1023 pixels",
               "give a larger picture, or crop it closer to a square");
 }
 

@@ -442,20 +442,24 @@ class Acting(ProgramTest):
             (globalThis.added ??= []).push(performance.now());
             return add.call(this);
           };
+          const play = HTMLMediaElement.prototype.play;
+          HTMLMediaElement.prototype.play = function () { globalThis.voice = this; return play.call(this); };
           document.getElementById('start').click();
         })()""")
         self.browser.wait(f"({MARKS}).length === 1", "the label")
         press = "document.getElementById('record').click()"
         pressed = "part('sound').getAttribute('aria-pressed') === 'true'"
         for heard in (False, True):
-            self.browser.run("globalThis.added = []")
+            self.browser.run("globalThis.added = []; globalThis.voice = undefined")
             self.browser.run(press)
+            self.browser.wait("globalThis.added.length > 0", "the film's first frame, with which its sound begins")
             self.browser.run("part('marks').firstChild.click()")
             if not heard:
                 self.browser.wait(pressed, "the sound that the tap has asked for")
             self.browser.run("part('sound').click()")
             self.assertEqual(self.browser.run(pressed), heard)
-            self.browser.wait("globalThis.added?.length > 5 && added.at(-1) - added[0] > 1200", "frames of a film")
+            self.browser.wait("globalThis.voice?.currentTime > 1", "a second of the voice")
+            self.browser.wait("added.length > 5 && added.at(-1) - added[0] > 1200", "frames of a film")
             self.browser.run(press)
             self.browser.wait("document.getElementById('photo').open", "the film")
             film = self.folder / f"film-{heard}"
@@ -471,6 +475,7 @@ class Acting(ProgramTest):
             loudest = float(re.search(r"max_volume: (\S+) dB", measured)[1])
             self.assertGreater(loudest, -30, "a sine of -18 dB")
             self.browser.run("document.getElementById('photo').close()")
+            self.browser.wait("voice.ended", "the end of the voice, after which a tap begins it again")
         # Sound is still the visitor's choice.
         self.assertEqual(self.browser.run("part('volume').hidden"), False)
         self.browser.run("part('close').click()")
