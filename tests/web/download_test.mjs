@@ -246,9 +246,9 @@ function open(copy, cache) {
     arrival = new Arrival(source, decoder);
     await arrival.begin(start);
     for (const { offset, bytes } of arrival.found) take(offset, bytes);
-    await arrival.bring(STAGE.show, take);
+    await arrival.download(STAGE.show, take);
   })();
-  const whole = begun.then(() => arrival.bring(STAGE.refine, take)).then(() => got);
+  const whole = begun.then(() => arrival.download(STAGE.refine, take)).then(() => got);
   whole.catch(() => {});
   const close = () => source.close();
   return { begun, whole, close };

@@ -100,7 +100,7 @@ export class RawArrival {
    * @param {number} stage
    * @param {Take} take
    */
-  async bring(stage, take) {
+  async download(stage, take) {
     if (stage !== STAGE.refine) return;
     while (this.#at < this.size) {
       const size = Math.min(PASSED, this.size - this.#at);
@@ -111,7 +111,7 @@ export class RawArrival {
   }
 
   /**
-   * In place of bring(), for lod-stream.js: the last stage in parts that can be had by
+   * In place of download(), for lod-stream.js: the last stage in parts that can be had by
    * themselves. first: of those that have not come.
    */
   parts() {
@@ -188,7 +188,7 @@ export class Arrival {
     });
     this.#recipe = recipe;
     this.#read(new DataView(recipe.buffer));
-    await this.bring(STAGE.find, (offset, bytes) => this.found.push({offset, bytes}));
+    await this.download(STAGE.find, (offset, bytes) => this.found.push({offset, bytes}));
   }
 
   /** @param {DataView} view */
@@ -261,7 +261,7 @@ export class Arrival {
    * @param {number} stage
    * @param {Take} take
    */
-  async bring(stage, take) {
+  async download(stage, take) {
     let before;
     for (; this.#pieces[this.#next]?.stage <= stage; ++this.#next) {
       const piece = this.#pieces[this.#next];
@@ -283,7 +283,7 @@ export class Arrival {
   }
 
   /**
-   * In place of bring(), for lod-stream.js: parts that can be had by themselves. first: of those
+   * In place of download(), for lod-stream.js: parts that can be had by themselves. first: of those
    * that have not come.
    */
   parts() {

@@ -191,7 +191,7 @@ export class View extends EventTarget {
    */
   async #bringCoarse(arrival) {
     if (arrival.inOrder) return;
-    await arrival.bring(STAGE.show, (offset, bytes) => this.#engine.put(offset, bytes));
+    await arrival.download(STAGE.show, (offset, bytes) => this.#engine.put(offset, bytes));
     this.#showCoarse();
     performance.mark('modar: coarse');
     this.#tellRefined();
@@ -254,8 +254,24 @@ export class View extends EventTarget {
 
   #showCoarse() {
     this.#coarse = true;
-    if (!this.#lost) this.#engine.showCoarse(this.#fixedLight);  // else #restore() will
+    if (!this.#lost)  // else #restore() will
+      this.#inContext(() => this.#engine.showCoarse(this.#fixedLight));
     this.#empty = this.#lost;
+  }
+
+  /**
+   * False: the context is lost, of which its event may not have told yet.
+   * @param {() => void} use
+   */
+  #inContext(use) {
+    try {
+      use();
+      return true;
+    } catch (error) {
+      if (!this.#gl.context.isContextLost()) throw error;
+      this.#lose();
+      return false;
+    }
   }
 
   /**
@@ -266,20 +282,14 @@ export class View extends EventTarget {
     for (;;) {
       await this.#restored;
       const run = this.#losses;
-      try {
-        this.#engine.beginRest(arrival.inOrder);
-      } catch (error) {
-        if (!this.#gl.context.isContextLost()) throw error;
-        this.#lose();
-        continue;
-      }
-      await arrival.bring(STAGE.refine, (offset, bytes) => this.#engine.pass(offset, bytes));
-      if (run === this.#losses) break;
+      if (!this.#inContext(() => this.#engine.beginRest(arrival.inOrder))) continue;
+      await arrival.download(STAGE.refine, (offset, bytes) => this.#engine.pass(offset, bytes));
+      this.#cover();
+      if (run === this.#losses && this.#inContext(() => this.#engine.showAll(this.#fixedLight)))
+        break;
       arrival = await arrival.again();
     }
     this.#arrival = arrival;
-    this.#cover();
-    this.#engine.showAll(this.#fixedLight);
     this.#told();
   }
 
