@@ -15,6 +15,16 @@ interface VideoFrame {
 }
 declare const VideoFrame: { new(source: HTMLVideoElement, options: { timestamp: number }): VideoFrame };
 
+interface MediaTrackCapabilities {
+  torch?: boolean;
+}
+interface MediaTrackConstraintSet {
+  torch?: boolean;
+}
+interface Navigator {
+  readonly connection?: { readonly saveData: boolean };
+}
+
 interface ExtendableEvent extends Event {
   waitUntil(promise: Promise<unknown>): void;
 }

@@ -1,3 +1,4 @@
+// @ts-check
 // The page around <modar-viewer>: a cover, languages, photos and films to share, storage on the
 // device.
 import {Camera} from './camera.js';
@@ -14,10 +15,35 @@ import {directionOf, fetchJson, fill, labelOf, showWords} from './viewer-words.j
 
 export {Camera, Recorder, View};  // as this page has them
 
-const $ = (id) => document.getElementById(id);
+/**
+ * @typedef {import('./modar-viewer.js').ViewerPattern & {image: string, usdz?: string, glb?:
+ * string}} Pattern of site.json
+ * @typedef {{title: string, file: string, hash: string, installed?: boolean, patterns: Pattern[],
+ *     source?: () => Promise<any>}} Bundle
+ * @typedef {{text: string, url: string, lang?: string}} Link
+ * @typedef {{title: string, languages: string[], bundles: Bundle[], own?: Bundle[],
+ *     release?: {url: string}, statements?: Record<string, Link>, links?: Link[]}} Site
+ *
+ * The elements that are more than an HTMLElement.
+ * @typedef {{
+ *   viewer: import('./modar-viewer.js').ModarViewer, bundle: HTMLSelectElement,
+ *   language: HTMLSelectElement, qr: HTMLCanvasElement, room: HTMLAnchorElement,
+ *   save: HTMLAnchorElement, film: HTMLVideoElement, 'photo-image': HTMLImageElement,
+ *   'own-file': HTMLInputElement, start: HTMLButtonElement, look: HTMLButtonElement,
+ *   forget: HTMLButtonElement, share: HTMLButtonElement, photo: HTMLDialogElement,
+ *   notes: HTMLDialogElement, own: HTMLDialogElement,
+ * }} Parts
+ */
+
+/**
+ * @template {string} Id
+ * @param {Id} id
+ * @returns {Id extends keyof Parts ? Parts[Id] : HTMLElement}
+ */
+const $ = (id) => /** @type {any} */ (document.getElementById(id));
 const root = document.documentElement;
 const viewer = $('viewer');
-const SCOPE = new URL('./', location).href;
+const SCOPE = new URL('./', location.href).href;
 
 const KEPT_LANGUAGE = 'modar-language';
 /** Pictures of the visitor's own. */
@@ -25,34 +51,50 @@ const OWN_CACHE = `modar own ${SCOPE}`;
 
 /**
  * The promise of what own-picture.js exports, once it is needed; and what the visitor has added.
+ * @type {Promise<import('./own-picture.js').OwnPictures> | null}
  */
 let own = null;
 
+/** @type {Site} */
 let site;
+/** @type {Record<string, any>} */
 let words;
+/** @type {Recorder | null} */
 let recorder = null;
-/** The promise of the bundle that is loaded before the visitor starts. */
+/**
+ * The promise of the bundle that is loaded before the visitor starts.
+ * @type {Promise<void> | null}
+ */
 let loading = null;
-/** The copy of the bundle that comes. */
+/**
+ * The copy of the bundle that comes.
+ * @type {Copy | null}
+ */
 let copy = null;
-/** Of requests for bundles: past what the browser has kept, once that was no good. */
+/**
+ * Of requests for bundles: past what the browser has kept, once that was no good.
+ * @type {RequestCache}
+ */
 let cache = 'default';
 /**
  * Until the stored bundle is whole; and whether the visitor has deleted it since the page was
  * opened.
+ * @type {Promise<unknown> | null}
  */
 let keeping = null;
 let forgotten = false;
 
 // ---- words ----
 
+/** @param {string[]} languages */
 function chooseLanguage(languages) {
   const wanted = new URLSearchParams(location.search).get('lang');
-  const liked = [wanted, stored(KEPT_LANGUAGE), ...navigator.languages].filter(Boolean).map(
+  const liked = [wanted ?? '', stored(KEPT_LANGUAGE), ...navigator.languages].map(
       (tag) => tag.toLowerCase().split('-')[0]);
   return liked.find((tag) => languages.includes(tag)) ?? languages[0];
 }
 
+/** @param {string} language */
 async function useLanguage(language) {
   words = await fetchJson(`words/${language}.json`);
   root.lang = language;
@@ -69,8 +111,8 @@ async function useLanguage(language) {
 }
 
 function showLanguages() {
-  const nameOf = (language) => {
-    const name = new Intl.DisplayNames([language], {type: 'language'}).of(language);
+  const nameOf = (/** @type {string} */ language) => {
+    const name = new Intl.DisplayNames([language], {type: 'language'}).of(language) ?? language;
     return name.charAt(0).toLocaleUpperCase(language) + name.slice(1);
   };
   $('language').replaceChildren(...site.languages.map((language) => {
@@ -83,7 +125,7 @@ function showLanguages() {
 
 function showLinks() {
   const statement = site.statements?.[root.lang];
-  $('links').replaceChildren(...[statement, ...site.links ?? []].filter(Boolean).map(
+  $('links').replaceChildren(...[...statement ? [statement] : [], ...site.links ?? []].map(
       ({text, url, lang = ''}) => Object.assign(
           document.createElement('a'), {textContent: text, href: url, lang, rel: 'noopener'})));
 }
@@ -92,7 +134,11 @@ function showLinks() {
 
 function currentBundle() { return site.bundles[Number($('bundle').value) || 0]; }
 
-/** Where a hint's picture is: in the site's folder, or in the files of an update. */
+/**
+ * Where a hint's picture is: in the site's folder, or in the files of an update.
+ * @param {string} image
+ * @param {boolean} [installed]
+ */
 async function addressOf(image, installed) {
   if (!installed) return image;
   const blob = await installedFile(SCOPE, image);
@@ -122,13 +168,16 @@ async function chooseBundles() {
           .catch(() => undefined);
   site.own ??= site.bundles;
   site.bundles = installed ?? site.own;
-  $('bundle').replaceChildren(...site.bundles.map(({title}, i) => new Option(title, i)));
+  $('bundle').replaceChildren(...site.bundles.map(({title}, i) => new Option(title, `${i}`)));
   $('choice').hidden = site.bundles.length < 2;
 }
 
 const canKeep = () => !forgotten && 'serviceWorker' in navigator && globalThis.isSecureContext;
 
-/** Where a bundle's bytes come from, the same each time. */
+/**
+ * Where a bundle's bytes come from, the same each time.
+ * @param {Bundle} bundle
+ */
 function sourceOf(bundle) {
   const installed = async () => {
     const file = await installedFile(SCOPE, bundle.file);
@@ -158,7 +207,7 @@ async function loadBundle(again = false) {
   try {
     await viewer.load();
   } catch (error) {
-    if (again || !isRotten(error)) throw error;
+    if (again || !isRotten(/** @type {{code?: string}} */ (error))) throw error;
     // Stored files have rotted: the network, or the site's own bundles, replace them.
     if (bundle.installed) {
       await forgetInstalled(SCOPE);
@@ -176,7 +225,11 @@ async function loadBundle(again = false) {
 function update() {
   if (!site.release || !navigator.onLine || !('caches' in globalThis)) return;
   const worker = new Worker('update-worker.js', {type: 'module'});
-  const end = ({state, code = '', text = ''}) => {
+  const end = (/** @type {{state: string, code?: string, text?: string}} */ {
+    state,
+    code = '',
+    text = ''
+  }) => {
     worker.terminate();
     root.dataset.update = `${state} ${code}`.trim();
     if (text) console.info(`No update: ${text} [${code}]`);
@@ -189,8 +242,8 @@ function update() {
   worker.postMessage({
     scope: SCOPE,
     ...site.release,
-    url: new URL(site.release.url, location).href,
-    hashes: site.own.map(({hash}) => hash)
+    url: new URL(site.release.url, location.href).href,
+    hashes: (site.own ?? site.bundles).map(({hash}) => hash)
   });
 }
 
@@ -209,10 +262,11 @@ async function prepare() {
 /**
  * Without its words the page has no buttons to press: index.html has a sentence in each language,
  * which loads the page again.
+ * @param {unknown} error
  */
 function tellUnprepared(error) {
   console.error(error);
-  const sentences = [...$('unloaded').children];
+  const sentences = /** @type {HTMLElement[]} */ ([...$('unloaded').children]);
   const language = chooseLanguage(sentences.map(({lang}) => lang));
   for (const sentence of sentences) sentence.hidden = sentence.lang !== language;
   Object.assign($('unloaded'), {hidden: false, className: 'now'});
@@ -231,7 +285,10 @@ async function showElsewhere() {
 
 // ---- the visitor's room ----
 
-/** Links to the viewer that a phone has for its visitor's room: Quick Look or Scene Viewer. */
+/**
+ * Links to the viewer that a phone has for its visitor's room: Quick Look or Scene Viewer.
+ * @param {{usdz?: string, glb?: string}} pattern
+ */
 function showRoom({usdz, glb} = {}) {
   const room = $('room');
   if (usdz && room.relList.supports('ar')) room.href = usdz;
@@ -241,8 +298,9 @@ function showRoom({usdz, glb} = {}) {
   room.hidden = !room.hasAttribute('href');
 }
 
-const sceneViewer = (file) => `intent://arvr.google.com/scene-viewer/1.0?mode=ar_preferred&file=${
-                                  encodeURIComponent(file.href)}` +
+const sceneViewer = (/** @type {URL} */ file) =>
+    `intent://arvr.google.com/scene-viewer/1.0?mode=ar_preferred&file=${
+        encodeURIComponent(file.href)}` +
     '#Intent;scheme=https;package=com.google.android.googlequicksearchbox;action=android.intent.action.VIEW;' +
     `S.browser_fallback_url=${encodeURIComponent(location.href)};end;`;
 
@@ -256,7 +314,7 @@ function ownPictures() {
 }
 
 async function addOwn() {
-  const [file] = $('own-file').files;
+  const file = $('own-file').files?.[0];
   $('own-file').value = '';  // the same one again is a change, too
   if (!file) return;
   try {
@@ -278,7 +336,8 @@ async function record() {
     recorder.stop();
     return;
   }
-  const pressed = (on) => $('record').setAttribute('aria-pressed', String(on));
+  const pressed = (/** @type {boolean} */ on) =>
+      $('record').setAttribute('aria-pressed', String(on));
   try {
     recorder = new Recorder(viewer.layers, viewer.film);
     pressed(true);
@@ -290,7 +349,10 @@ async function record() {
   }
 }
 
-/** A photo or film, to be looked at, sent and kept. */
+/**
+ * A photo or film, to be looked at, sent and kept.
+ * @param {File} file
+ */
 function offer(file) {
   const film = file.type.startsWith('video/');
   URL.revokeObjectURL($('save').href);
@@ -309,7 +371,7 @@ function offer(file) {
 // ---- buttons and events ----
 
 function listenToViewer() {
-  const progress = (text) => {
+  const progress = (/** @type {string} */ text) => {
     $('progress').textContent = text;
   };
   viewer.addEventListener(
@@ -318,7 +380,8 @@ function listenToViewer() {
           progress(loaded < total ?
                        fill(words.loading, {percent: Math.floor((100 * loaded) / total)}) :
                        words.preparing));
-  for (const type of ['whole', 'error']) viewer.addEventListener(type, () => progress(''));
+  for (const type of /** @type {const} */ (['whole', 'error']))
+    viewer.addEventListener(type, () => progress(''));
   viewer.addEventListener('load', async () => {
     if (await globalThis.caches?.has(OWN_CACHE)) (await ownPictures()).restore();
   });
@@ -330,10 +393,16 @@ function listenToViewer() {
     recorder?.stop();
     $('record').hidden = !canRecord();
   });
-  viewer.addEventListener('scenechange', ({detail}) => showRoom(viewer.patterns[detail.pattern]));
+  viewer.addEventListener(
+      'scenechange',
+      ({detail}) => showRoom(/** @type {Pattern | undefined} */ (viewer.patterns[detail.pattern])));
 }
 
-/** Opens the viewer; a second press meanwhile does nothing. */
+/**
+ * Opens the viewer; a second press meanwhile does nothing.
+ * @param {'start' | 'look'} button
+ * @param {() => Promise<void>} action
+ */
 async function press(button, action) {
   $(button).disabled = true;
   try {
@@ -387,17 +456,19 @@ async function forget() {
 /**
  * Keeps the page for visits without a network; whole: and its bundles, once it has what it needs
  * now.
+ * @param {boolean} [whole]
  */
 function keep(whole) {
   if (!canKeep()) return;
   keeping = navigator.serviceWorker.register('sw.js')
-                .then(
-                    ({active, waiting, installing}) =>
-                        whole && new Promise((resolve) => {
-                          const {port1, port2} = new MessageChannel();
-                          port1.onmessage = resolve;
-                          (active ?? waiting ?? installing).postMessage('keep', [port2]);
-                        }))
+                .then(({active, waiting, installing}) => whole && new Promise((resolve) => {
+                                                           const {port1, port2} =
+                                                               new MessageChannel();
+                                                           port1.onmessage = resolve;
+                                                           /** @type {ServiceWorker} */ (
+                                                               active ?? waiting ?? installing)
+                                                               .postMessage('keep', [port2]);
+                                                         }))
                 .catch(() => {});  // the page works without it, but not offline
 }
 

@@ -20,6 +20,15 @@ export interface SceneNode {
   mark: string;
 }
 
+export interface ViewEvents {
+  text: CustomEvent<{ node: number }>;
+  link: CustomEvent<{ address: string }>;
+  caption: CustomEvent<{ node: number; text: string; language: string }>;
+  drawn: Event;
+  refined: Event;
+  error: CustomEvent<unknown>;
+}
+
 /**
  * Scenes may act (nodes and actions of the bundle). Events: `text`, detail {node}: the words of a label are to be shown; `link`,
  * detail {address}: the visitor is to be asked whether to open it; `caption`, detail {node, text, language}: the words that are
@@ -96,6 +105,12 @@ export class View extends EventTarget {
   readonly webgl: 1 | 2;
   readonly heapBytes: number;
   readonly gpuBytes: number;
+  /** For modar-viewer.js: of the bundle, what has come of it, until the next call. */
+  readonly bytes: Uint8Array;
   /** Of the last drawing. */
   readonly triangles: number;
+  addEventListener<K extends keyof ViewEvents>(
+    type: K, listener: (event: ViewEvents[K]) => void, options?: boolean | AddEventListenerOptions): void;
+  addEventListener(
+    type: string, listener: EventListenerOrEventListenerObject | null, options?: boolean | AddEventListenerOptions): void;
 }

@@ -1,9 +1,10 @@
+// @ts-check
 // <modar-viewer src="vase.modar">: the models of a bundle before a visitor's camera, and on a
 // turntable without one. `modar web` makes its page of this element. Types: modar-viewer.d.ts.
 import {describe, titleOf} from './bundle.js';
 import {Camera, hostApp, ownBrowser} from './camera.js';
-import {POSE, POSE_FLOATS} from './engine.js';
-import {allowMotion, load, ModarError} from './modar.js';
+import {ModarError, POSE, POSE_FLOATS} from './engine.js';
+import {allowMotion, load} from './modar.js';
 import {View} from './modar-view.js';
 import {Turntable} from './turntable.js';
 import {build} from './viewer-parts.js';
@@ -24,6 +25,23 @@ const LARGEST = 5;
 /** Pictures that a hint has room for. */
 const MOST_PLATES = 4;
 
+/**
+ * @typedef {import('./modar-viewer.js').ViewerPattern} ViewerPattern
+ * @typedef {import('./modar.js').Frame} Frame
+ * @typedef {{errors: Record<string, [title: string, cure: string]>} & Record<string, any>} Words
+ * @typedef {{node: number, text?: string, language: string}} Caption
+ *
+ * The parts that are more than an HTMLElement.
+ * @typedef {{
+ *   poster: HTMLImageElement, ground: HTMLImageElement, video: HTMLVideoElement,
+ *   picture: HTMLCanvasElement, models: HTMLCanvasElement, qr: HTMLCanvasElement,
+ *   start: HTMLButtonElement, look: HTMLButtonElement, volume: HTMLInputElement,
+ *   scene: HTMLSelectElement, 'leave-open': HTMLAnchorElement, stage: HTMLDialogElement,
+ *   leave: HTMLDialogElement, choose: HTMLDialogElement, problem: HTMLDialogElement,
+ * }} Parts
+ */
+
+/** @type {Record<string, string>} */
 const BY_NAME = {
   NotAllowedError: 'refused',
   SecurityError: 'refused',
@@ -32,6 +50,7 @@ const BY_NAME = {
   NotReadableError: 'busy',
   AbortError: 'busy',
 };
+/** @type {Record<string, string>} */
 const BY_CODE = {
   'web.webgl': 'webgl',
   'web.wasm': 'old',
@@ -48,39 +67,60 @@ const BY_CODE = {
 /** What the browser of another app may lack, and the phone's own has. */
 const OF_HOSTS = ['refused', 'none', 'busy', 'old'];
 /** The error text if no words could be loaded. */
-const NO_WORDS = ['The page could not be loaded', 'Check the network and load it again.'];
+const NO_WORDS =
+    /** @type {const} */ (['The page could not be loaded', 'Check the network and load it again.']);
 
+/** @param {any} error */
 function kindOf(error) {
-  const byCode = ({code}) => BY_CODE[code] ?? (code.startsWith('gl.') ? 'webgl' : 'bundle');
+  const byCode = (/** @type {ModarError} */ {code}) =>
+      BY_CODE[code] ?? (code.startsWith('gl.') ? 'webgl' : 'bundle');
   const kind = error instanceof ModarError ? byCode(error) : BY_NAME[error?.name] ?? 'other';
   return hostApp() && OF_HOSTS.includes(kind) ? 'host' : kind;
 }
 
+/**
+ * @param {Element} element
+ * @param {string} text
+ */
 function setText(element, text) {
   if (element.textContent !== text)
     element.textContent = text;  // else readers repeat it for each frame
 }
 
-const pictureOf = async ({image}) => (typeof image === 'function' ? image() : image);
+const pictureOf = async (/** @type {ViewerPattern} */ {image}) =>
+    (typeof image === 'function' ? image() : image);
 
 /** A server that renders pages has no elements, and may import this all the same. */
 export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
   static observedAttributes = ['src', 'poster', 'alt', 'lang'];
 
   #root = build(this);
+  /** @type {Words | null} */
   #words = null;
   #wordsGiven = false;
-  /** Until words are there. */
+  /**
+   * Until words are there.
+   * @type {Promise<void> | null}
+   */
   #ready = null;
+  /** @type {import('./modar-viewer.js').ModarViewer['state']} */
   #state = 'start';
+  /** @type {import('./modar-viewer.js').ModarViewer['srcObject']} */
   #srcObject = null;
-  /** {source, done}: the loaded bundle, and the promise of it. */
+  /**
+   * The loaded bundle, and the promise of it.
+   * @type {{source: ModarViewer['srcObject'], done: Promise<void>} | null}
+   */
   #loading = null;
-  #modar = null;
-  #view = null;
+  /** Both null without a bundle. */
+  #modar = /** @type {import('./modar.js').Modar} */ (/** @type {unknown} */ (null));
+  #view = /** @type {View} */ (/** @type {unknown} */ (null));
+  /** @type {ViewerPattern[] | null} */
   #patterns = null;
+  /** @type {ViewerPattern[] | null} */
   #patternsGiven = null;
   #camera = new Camera();
+  /** @type {Turntable | null} */
   #table = null;
   #gesture = {turn: 0, size: 1, mirror: false};
   #shown = -1;
@@ -93,7 +133,10 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
   #labelled = -1;
   #folded = false;
   #asked = false;
-  /** The sound of now, by node. */
+  /**
+   * The sound of now, by node.
+   * @type {Map<number, string>}
+   */
   #cues = new Map();
   #unseenSince = 0;
   /** What the visitor has asked for last. */
@@ -104,7 +147,12 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     this.#listen();
   }
 
-  #$(id) { return this.#root.getElementById(id); }
+  /**
+   * @template {string} Id
+   * @param {Id} id
+   * @returns {Id extends keyof Parts ? Parts[Id] : HTMLElement}
+   */
+  #$(id) { return /** @type {any} */ (this.#root.getElementById(id)); }
 
   connectedCallback() {
     document.addEventListener('visibilitychange', this.#onVisibility);
@@ -120,6 +168,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     this.#loading = null;
   }
 
+  /** @param {string} name */
   attributeChangedCallback(name) {
     if (name === 'poster' || name === 'alt') {
       const [poster, src] = [this.#$('poster'), this.getAttribute('poster')];
@@ -159,20 +208,26 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
   /** The sound of videos and sounds as a stream, or null. Asked for in a click's handler. */
   get film() { return this.#view?.film ?? null; }
 
+  /** @returns {ViewerPattern[]} */
   get patterns() { return this.#patterns ?? []; }
 
-  /** null: as the bundle says. */
+  /**
+   * null: as the bundle says.
+   * @param {ViewerPattern[] | null} patterns
+   */
   set patterns(patterns) {
     this.#patternsGiven = patterns;
     this.#usePatterns(patterns);
   }
 
+  /** @param {Words} words */
   set words(words) {
     this.#wordsGiven = true;
     this.#ready = Promise.resolve();
     this.#useWords(words, this.#language);
   }
 
+  /** @param {ModarViewer['state']} state */
   #setState(state) {
     if (state === this.#state) return;
     this.#state = state;
@@ -182,14 +237,20 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
 
   // ---- words ----
 
-  get #language() { return this.closest('[lang]')?.lang || navigator.language; }
+  get #language() {
+    return /** @type {HTMLElement | null} */ (this.closest('[lang]'))?.lang || navigator.language;
+  }
 
   async #loadWords() {
     if (this.#wordsGiven) return;
-    const {words, language} = await wordsFor(this.#language).catch(() => ({}));
-    if (words && !this.#wordsGiven) this.#useWords(words, language);
+    const found = await wordsFor(this.#language).catch(() => null);
+    if (found && !this.#wordsGiven) this.#useWords(found.words, found.language);
   }
 
+  /**
+   * @param {Words} words
+   * @param {string} language
+   */
   #useWords(words, language) {
     this.#words = words;
     Object.assign(this.#$('all'), {lang: language, dir: directionOf(language)});
@@ -202,10 +263,16 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     if (this.#$('stage').open) this.#showMarks();
   }
 
+  /**
+   * @param {string} key
+   * @param {Record<string, string | number>} [values]
+   */
   #say(key, values) { return fill(this.#words?.[key] ?? '', values); }
 
+  /** @param {number} pattern */
   #labelOf(pattern) { return labelOf(this.patterns[pattern], this.#language); }
 
+  /** @param {ViewerPattern[] | null} patterns */
   #usePatterns(patterns) {
     this.#patterns = patterns;
     this.#shown = -1;
@@ -226,15 +293,18 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
   #showPatternNames() {
     const chosen = this.#$('scene').selectedIndex;
     const labels = this.patterns.map((_, i) => this.#labelOf(i));
-    const textOf = ({name, picture}) =>
+    const textOf = (/** @type {ReturnType<typeof labelOf>} */ {name, picture}) =>
         (labels.filter((each) => each.name === name).length > 1 ? `${name} (${picture})` : name);
     this.#$('scene').replaceChildren(
-        ...labels.map((label, i) => new Option(textOf(label), i, false, i === chosen)));
+        ...labels.map((label, i) => new Option(textOf(label), `${i}`, false, i === chosen)));
   }
 
   // ---- the bundle ----
 
-  /** The bundle, once: begun before the visitor starts, and waited for then. */
+  /**
+   * The bundle, once: begun before the visitor starts, and waited for then.
+   * @returns {Promise<void>}
+   */
   load() {
     const source = this.#srcObject ?? this.src;
     if (this.#loading?.source === source) return this.#loading.done;
@@ -256,7 +326,10 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     return done;
   }
 
-  /** @see modar-viewer.d.ts */
+  /**
+   * @see modar-viewer.d.ts
+   * @param {HTMLImageElement | HTMLCanvasElement | ImageBitmap} image
+   */
   async addPattern(image, {name = '', widthMm = 0, scene = 0} = {}) {
     await this.load();
     const model = this.#modar.scenes[scene]?.model;
@@ -268,12 +341,12 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       });
     const pattern = await this.#modar.addPattern(image, {name, widthMm});
     this.#view.stand(name, scene);
-    const [width, height] =
-        [image.naturalWidth ?? image.width, image.naturalHeight ?? image.height];
+    const [width, height] = 'naturalWidth' in image ? [image.naturalWidth, image.naturalHeight] :
+                                                      [image.width, image.height];
     const copy = Object.assign(document.createElement('canvas'), {width, height});
-    copy.getContext('2d').drawImage(image, 0, 0);
+    /** @type {CanvasRenderingContext2D} */ (copy.getContext('2d')).drawImage(image, 0, 0);
     const address = URL.createObjectURL(await new Promise((resolve) => {
-      copy.toBlob(resolve);
+      copy.toBlob(/** @type {BlobCallback} */ (resolve));
     }));
     this.#usePatterns([
       ...this.patterns, {name, title: name, models: titleOf(model), width, height, image: address}
@@ -283,9 +356,10 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
 
   #unload() {
     this.#modar?.close();
-    this.#modar = this.#view = null;
+    this.#modar = this.#view = /** @type {any} */ (null);
   }
 
+  /** @param {NonNullable<ModarViewer['srcObject']>} source */
   async #open(source) {
     const opening = load(typeof source === 'function' ? await source() : source, {
       onProgress: (loaded, total) => this.#tellProgress(loaded, total),
@@ -298,6 +372,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     });
     creating.catch(() => {});  // told below, after what ails the bundle
     const opened = await opening;
+    /** @type {View} */
     let view;
     try {
       view = this.#view = await creating;
@@ -312,16 +387,19 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     this.#followRest(view);
     opened.addEventListener('frame', ({detail}) => this.#onFrame(detail));
     opened.addEventListener('dropped', ({detail}) => {
-      if (this.#camera.stream) this.#view.show(detail.source, this.#gesture);
+      if (this.#camera.stream) view.show(detail.source, this.#gesture);
     });
     opened.addEventListener('error', ({detail}) => this.fail(detail));
-    for (const type of ['found', 'updated', 'lost']) {
+    for (const type of /** @type {const} */ (['found', 'updated', 'lost'])) {
       opened.addEventListener(
           type, ({detail}) => this.dispatchEvent(new CustomEvent(type, {detail})));
     }
   }
 
-  /** While the rest comes, the present part can be used. */
+  /**
+   * While the rest comes, the present part can be used.
+   * @param {View} view
+   */
   async #followRest(view) {
     const wrong = await view.whole.catch((error) => error);
     if (view !== this.#view) return;
@@ -330,6 +408,10 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     else this.dispatchEvent(new Event('whole'));
   }
 
+  /**
+   * @param {number} loaded
+   * @param {number} total
+   */
   #tellProgress(loaded, total) {
     this.#showProgress(
         loaded < total ? this.#say('loading', {percent: Math.floor((100 * loaded) / total)}) :
@@ -338,7 +420,11 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     this.dispatchEvent(new ProgressEvent('progress', {lengthComputable: true, loaded, total}));
   }
 
-  /** On the cover in words, on the stage as a bar. */
+  /**
+   * On the cover in words, on the stage as a bar.
+   * @param {string} text
+   * @param {number} share
+   */
   #showProgress(text, share) {
     setText(this.#$('progress'), text);
     Object.assign(this.#$('rest'), {hidden: share >= 1, value: share});
@@ -352,7 +438,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       used.dataset.used = 'yes';
       return used;
     }
-    const canvas = used.cloneNode(false);
+    const canvas = /** @type {HTMLCanvasElement} */ (used.cloneNode(false));
     used.replaceWith(canvas);
     this.#listenToGestures(canvas);
     return canvas;
@@ -414,7 +500,10 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     this.#setState('start');
   }
 
-  /** Of an incomplete bundle, the present part stays. */
+  /**
+   * Of an incomplete bundle, the present part stays.
+   * @param {unknown} error
+   */
   #failRest(error) {
     this.#loading = null;                 // the next start tries again
     if (this.#state === 'start') return;  // and tells
@@ -422,12 +511,16 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     else this.fail(error);
   }
 
-  /** Stops, and shows the visitor the fault and its cure. */
+  /**
+   * Stops, and shows the visitor the fault and its cure.
+   * @param {unknown} error
+   */
   fail(error) {
     this.stop();
     this.#tellProblem(error);
   }
 
+  /** @param {any} error */
   #tellProblem(error) {
     if (!this.isConnected) return;  // removed meanwhile: there is nobody to tell
     const kind = kindOf(error);
@@ -453,13 +546,21 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     this.dispatchEvent(new ErrorEvent('error', {error, message: String(error?.message ?? error)}));
   }
 
-  /** Both layers in one picture. */
+  /**
+   * Both layers in one picture.
+   * @param {'image/jpeg' | 'image/png'} [type]
+   */
   photograph(type) { return this.#view.photograph(type); }
 
+  /** @param {boolean} busy */
   #setBusy(busy) {
-    for (const id of ['start', 'look']) this.#$(id).disabled = busy;
+    for (const id of /** @type {const} */ (['start', 'look'])) this.#$(id).disabled = busy;
   }
 
+  /**
+   * @param {ModarViewer['state']} state
+   * @param {number} pattern
+   */
   #enter(state, pattern) {
     this.#$('full').hidden = !document.fullscreenEnabled;
     this.#setState(state);
@@ -480,7 +581,7 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     try {
       await navigator.clipboard.writeText(location.href);
       this.#$('copy').textContent = this.#say('copied');
-    } catch { getSelection().selectAllChildren(this.#$('problem-detail')); }
+    } catch { getSelection()?.selectAllChildren(this.#$('problem-detail')); }
   }
 
   // ---- the camera ----
@@ -499,7 +600,7 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     const {track} = this.#camera;
     await this.#modar.start(this.#$('video'), {...this.#camera.focal, extended: true});
     this.#$('flip').hidden = (await this.#camera.list()).length < 2;
-    this.#$('torch').hidden = !track.getCapabilities?.().torch;
+    this.#$('torch').hidden = !track?.getCapabilities?.().torch;
     this.#$('torch').setAttribute('aria-pressed', 'false');
   }
 
@@ -526,13 +627,13 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
 
   async #toggleTorch() {
     const lit = this.#$('torch').getAttribute('aria-pressed') !== 'true';
-    await this.#camera.track.applyConstraints({advanced: [{torch: lit}]});
+    await this.#camera.track?.applyConstraints({advanced: [{torch: lit}]});
     this.#$('torch').setAttribute('aria-pressed', String(lit));
   }
 
   async #showCameras() {
     const devices = await this.#camera.list();
-    const current = this.#camera.track.getSettings().deviceId;
+    const current = this.#camera.track?.getSettings().deviceId;
     this.#$('choose-list').replaceChildren(...devices.map((device, i) => {
       const label = document.createElement('label');
       const input = Object.assign(
@@ -560,13 +661,14 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
 
   #onResize = () => this.#table?.draw();
 
+  /** @param {number} pattern */
   async #turnScene(pattern) {
     const picture = this.patterns[pattern];
-    this.#$('scene').value = pattern;
+    this.#$('scene').value = `${pattern}`;
     Object.assign(
         this.#$('ground'),
         {width: picture.width, height: picture.height, src: await pictureOf(picture)});
-    this.#view.forgetActs();
+    this.#view?.forgetActs();
     this.#table?.show(pattern, picture);
   }
 
@@ -574,18 +676,26 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
 
   get #lookWords() { return this.#say(this.patterns.length > 1 ? 'lookMany' : 'look'); }
 
+  /**
+   * @param {Frame} frame
+   * @param {number} unseenMs
+   */
   #adviceFor({reason, brightness}, unseenMs) {
     if (brightness < DARK) return this.#say('dark');
-    if (unseenMs < PATIENCE_MS) return this.#$('reason').textContent;
+    if (unseenMs < PATIENCE_MS) return this.#$('reason').textContent ?? '';
     if (reason === 'lost by blur') return this.#say('blurred');
     if (reason === 'out of view') return this.#say('outside');
     if (reason === 'failed verification') return this.#say('hold');
     return unseenMs > FAR_MS ? `${this.#lookWords} ${this.#say('far')}` : this.#lookWords;
   }
 
+  /** @param {string} name */
   #nameModels(name) { this.#$('models').setAttribute('aria-label', name); }
 
-  /** The texts of a pattern's models and pictures, or of a tapped label. */
+  /**
+   * The texts of a pattern's models and pictures, or of a tapped label.
+   * @param {{language: string, name: string, text: string}} label
+   */
   #fillLabel({language, name, text}) {
     this.#$('label-name').textContent = name;
     this.#$('label-text').textContent = text;
@@ -596,6 +706,7 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
   /**
    * Folded, the label is a button that shows it again. asked: by the visitor, so that it stays
    * unchanged.
+   * @param {boolean} folded
    */
   #fold(folded, asked = this.#asked) {
     this.#folded = folded;
@@ -613,7 +724,7 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
   #clearMarks() {
     const label = this.#$('label');
     if (label.hidden) return;
-    const marks = [...this.#$('marks').children].map((mark) => mark.getBoundingClientRect());
+    const marks = this.#marks.map((mark) => mark.getBoundingClientRect());
     const covers = () => {
       const {left, right, top, bottom} = label.getBoundingClientRect();
       return marks.some(
@@ -624,6 +735,7 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     if (!this.#asked && covers()) this.#fold(true);
   }
 
+  /** @param {number} pattern */
   #showLabel(pattern) {
     this.#noted = false;
     if (pattern >= 0 && pattern !== this.#labelled) {
@@ -658,6 +770,7 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     }
   }
 
+  /** @param {number} pattern */
   #showScene(pattern) {
     this.#shown = pattern;
     this.#showLabel(pattern);
@@ -666,19 +779,25 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
 
   // ---- labels that point, and what else a scene does ----
 
+  /** @param {number} node */
   #wordsOf(node) { return this.#view.wordsOf(node, this.#languages); }
 
   get #languages() { return [this.#language, this.#language.split('-')[0]]; }
 
   #useLanguages() { this.#view.languages = this.#languages; }
 
-  /** Sound comes by a visitor's own click or tap only, and what plays can be paused. */
+  /**
+   * Sound comes by a visitor's own click or tap only, and what plays can be paused.
+   * @param {string} id
+   * @param {(on: boolean) => void} set
+   */
   #press(id, set) {
     const on = this.#$(id).getAttribute('aria-pressed') !== 'true';
     this.#$(id).setAttribute('aria-pressed', String(on));
     set(on);
   }
 
+  /** @param {View} view */
   #listenToScenes(view) {
     this.#$('media').hidden = !view.nodes.some(({kind}) => kind === 'video' || kind === 'sound');
     this.#$('captions').hidden = !view.nodes.some((_, node) => view.captionsOf(node));
@@ -705,7 +824,10 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     });
   }
 
-  /** Those of what plays at once stand below each other. */
+  /**
+   * Those of what plays at once stand below each other.
+   * @param {Caption} caption
+   */
   #caption({node, text, language}) {
     this.#cues.delete(node);
     if (text) this.#cues.set(node, text);
@@ -725,16 +847,20 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     this.#$('volume').hidden = !sound;
   }
 
-  /** Whether the page leaves it to the viewer. */
+  /**
+   * Whether the page leaves it to the viewer.
+   * @param {string} type
+   * @param {unknown} detail
+   */
   #ask(type, detail) {
     return this.dispatchEvent(new CustomEvent(type, {detail, cancelable: true}));
   }
 
+  get #marks() { return /** @type {HTMLElement[]} */ ([...this.#$('marks').children]); }
+
   /** A button for each label on the screen, in the order of the bundle. */
   #showMarks() {
-    const marks = this.#$('marks');
-    const buttons =
-        new Map([...marks.children].map((button) => [Number(button.dataset.node), button]));
+    const buttons = new Map(this.#marks.map((button) => [Number(button.dataset.node), button]));
     for (const {node, x, y, covered} of this.#view?.labels() ?? []) {
       const button = buttons.get(node) ?? this.#addMark(node);
       buttons.delete(node);
@@ -746,29 +872,35 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     if (this.#view) this.#showSound();
   }
 
+  /** @param {number} node */
   #addMark(node) {
     const {mark} = this.#view.nodes[node];
     const {title, language} = this.#wordsOf(node);
     const button =
         Object.assign(document.createElement('button'), {type: 'button', textContent: mark});
-    button.dataset.node = node;
+    button.dataset.node = `${node}`;
     if (title) {
       Object.assign(button, {title, lang: language});
       button.setAttribute('aria-label', `${mark}: ${title}`);
     }
     button.addEventListener('click', () => this.#view.tapNode(node));
-    const after = [...this.#$('marks').children].find((other) => Number(other.dataset.node) > node);
+    const after = this.#marks.find((other) => Number(other.dataset.node) > node);
     this.#$('marks').insertBefore(button, after ?? null);
     return button;
   }
 
-  /** A tapped node acts, and the label is the pattern's again. */
+  /**
+   * A tapped node acts, and the label is the pattern's again.
+   * @param {HTMLCanvasElement} canvas
+   * @param {MouseEvent} place
+   */
   #tap(canvas, {clientX, clientY}) {
     const {left, top} = canvas.getBoundingClientRect();
     this.#view?.tap(clientX - left, clientY - top);
     if (this.#noted) this.#showLabel(this.#shown);
   }
 
+  /** @param {Frame} frame */
   #onFrame(frame) {
     if (!this.#camera.stream) return;
     if (this.#state === 'looking' && frame.reason === 'visible') performance.mark('modar: tracked');
@@ -785,6 +917,7 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     this.dispatchEvent(new CustomEvent('frame', {detail: frame}));
   }
 
+  /** @param {Frame} frame */
   #tellSeen(frame) {
     const now = performance.now();
     const first =
@@ -806,30 +939,35 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
   /**
    * What a visitor's hand moves: models before the camera at the next frame, the turntable at
    * once.
+   * @param {(held: {turn: number, size: number}) => void} by
    */
   #change(by) {
     by(this.#table?.gesture ?? this.#gesture);
     this.#table?.touched();
   }
 
+  /** @param {number} radians */
   #turn(radians) {
     this.#change((held) => {
       held.turn += radians;
     });
   }
 
+  /** @param {number} factor */
   #resize(factor) {
     this.#change((held) => {
       held.size = Math.min(LARGEST, Math.max(SMALLEST, held.size * factor));
     });
   }
 
-  /** Of the turntable alone: before the camera, the visitor walks. */
+  /**
+   * Of the turntable alone: before the camera, the visitor walks.
+   * @param {number} radians
+   */
   #tilt(radians) {
-    if (this.#table)
-      this.#change((held) => {
-        held.tilt += radians;
-      });
+    if (!this.#table) return;
+    this.#table.gesture.tilt += radians;
+    this.#table.touched();
   }
 
   #undo() {
@@ -837,6 +975,7 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     this.#table?.reset();
   }
 
+  /** @type {Record<string, () => void>} */
   #keys = {
     ArrowLeft: () => this.#turn(-TURN_A_KEY),
     ArrowRight: () => this.#turn(TURN_A_KEY),
@@ -850,13 +989,19 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     Escape: () => this.stop(),
   };
 
+  /** @param {HTMLCanvasElement} canvas */
   #listenToGestures(canvas) {
+    /** @type {Map<number, {x: number, y: number}>} */
     const fingers = new Map();
     const spread = () => {
       const [a, b] = [...fingers.values()];
       return Math.hypot(a.x - b.x, a.y - b.y);
     };
-    let tap = null;  // where one finger came down that has not moved
+    /**
+     * Where one finger came down that has not moved.
+     * @type {{x: number, y: number} | null}
+     */
+    let tap = null;
     canvas.addEventListener('pointerdown', (event) => {
       canvas.setPointerCapture(event.pointerId);
       fingers.set(event.pointerId, {x: event.clientX, y: event.clientY});
@@ -877,7 +1022,7 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
       finger.y = event.clientY;
       if (before > 0) this.#resize(spread() / before);
     });
-    for (const type of ['pointerup', 'pointercancel']) {
+    for (const type of /** @type {const} */ (['pointerup', 'pointercancel'])) {
       canvas.addEventListener(type, (event) => {
         fingers.delete(event.pointerId);
         if (tap && type === 'pointerup') this.#tap(canvas, event);
@@ -890,8 +1035,10 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     }, {passive: false});
   }
 
+  /** @param {KeyboardEvent} event */
   #onKey(event) {
-    if (['button', 'select', 'a', 'input', 'summary'].includes(event.target.localName) &&
+    if (['button', 'select', 'a', 'input', 'summary'].includes(
+            /** @type {Element} */ (event.target).localName) &&
         event.key !== 'Escape')
       return;
     if (event.ctrlKey || event.metaKey || event.altKey || !this.#keys[event.key]) return;
