@@ -10,8 +10,6 @@ export class Refused extends Error {
   code = '';
   /** @type {string | string[] | undefined} what must be installed */
   package = undefined;
-  /** @type {Studio.Point[] | undefined} of a photo: its own */
-  corners = undefined;
 
   /**
    * @param {{ error: string }} told

@@ -1,12 +1,12 @@
 // @ts-check
 // Step 2: where the picture is in the photo, how large it is in the world, and how well a phone
 // will know it.
-import {ask, askJson, Newest, Refused, thumb} from './api.js';
+import {ask, askJson, Newest, thumb} from './api.js';
 import {Corners} from './corners.js';
 import {toHundredths, unsure} from './files.js';
 import {button, choice, finding, grade, head, icon, LengthField, name, NumberField, part, tool} from './parts.js';
 import {rail} from './rail.js';
-import {arcOf, alongOf, widthOf} from './surface.js';
+import {arcOf, alongOf, sideName, widthOf} from './surface.js';
 import {addScene, deleteAsset, isGone, loadRivals, loadScore, patternOf, setPattern, state, tellError} from './state.js';
 import {number, said, t} from './words.js';
 
@@ -397,11 +397,10 @@ export class Picture {
               pattern, 'box', {sides: {...sides, [side]: event.target.value || undefined}}),
         },
           m('option', {value: ''}, t('none')),
-          state.project.patterns.filter((other) => other !== pattern)
-              .map(
-                  (other) =>
-                      m('option', {value: other.file, selected: sides?.[side] === other.file},
-                        other.name))));
+          state.project.patterns.filter((other) => other !== pattern).map((other) => {
+            const file = sideName(pattern.file, other.file);
+            return m('option', {value: file, selected: sides?.[side] === file}, other.name);
+          })));
   }
 
   /**
@@ -511,11 +510,7 @@ export class Picture {
       const {corners, sure} = await askJson('POST', 'corners', {file: pattern.file});
       if (!sure) unsure.add(pattern.name);
       await setPattern(pattern.name, {corners: toHundredths(corners)});
-    } catch (error) {
-      const own = error instanceof Refused ? error.corners : undefined;
-      if (!own) tellError(error);
-      else await setPattern(pattern.name, {corners: own});
-    }
+    } catch (error) { tellError(error); }
   }
 
   /** @param {Studio.Pattern} pattern */

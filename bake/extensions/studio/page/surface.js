@@ -75,12 +75,30 @@ function boxFaces({sides, file}, [w, h, d]) {
   ];
   return faces.map(([side, corner, right, down]) => {
     const other = side && sides[side];
-    return {corner, right, down, picture: !side ? '' : other ? beside(file, other) : undefined};
+    return {corner, right, down, picture: !side ? '' : other ? sideFile(file, other) : undefined};
   });
 }
 
-/** @type {(file: string, other: string) => string} */
-const beside = (file, other) => file.split('/').slice(0, -1).concat(other).join('/');
+/**
+ * What the bake reads for a side of a box: its name is relative to the front's folder.
+ * @type {(front: string, side: string) => string}
+ */
+const sideFile = (front, side) => {
+  const path = front.split('/').slice(0, -1);
+  for (const part of side.split('/')) part === '..' ? path.pop() : path.push(part);
+  return path.join('/');
+};
+
+/**
+ * Names a file of the project as a side of a box.
+ * @type {(front: string, file: string) => string}
+ */
+export const sideName = (front, file) => {
+  const [from, to] = [front, file].map((each) => each.split('/').slice(0, -1));
+  const differs = from.findIndex((folder, i) => folder !== to[i]);
+  const up = differs < 0 ? 0 : from.length - differs;
+  return '../'.repeat(up) + file.split('/').slice(from.length - up).join('/');
+};
 
 /**
  * @param {Studio.Pattern} pattern

@@ -77,8 +77,6 @@ class Player {
   close() {
     this.#ended = true;
     this.#tracker?.close();
-    const stream = this.video.srcObject;
-    if (stream instanceof MediaStream) stream.getTracks().forEach((track) => track.stop());
     this.video.srcObject = null;
     this.video.removeAttribute('src');
     if (this.address) URL.revokeObjectURL(this.address);
@@ -112,7 +110,7 @@ export class Try {
     this.phone = state.project.phone;
   }
 
-  onremove() { this.player?.close(); }
+  onremove() { this.close(); }
 
   async camera() {
     try {
@@ -137,11 +135,14 @@ export class Try {
 
   close() {
     this.player?.close();
+    if (this.source instanceof MediaStream)
+      this.source.getTracks().forEach((track) => track.stop());
     this.player = this.source = null;
     this.found = [];
   }
 
   /**
+   * Another bake has another player, of the same source.
    * @param {HTMLElement} dom
    * @param {MediaStream | Blob} source
    */
@@ -153,6 +154,7 @@ export class Try {
           said({code: error.code ?? 'gl', text: error.reason ?? error.message, cure: error.cure});
       m.redraw();
     };
+    this.player?.close();
     this.player = new Player(dom, {
       found: (names) => {
         this.found = names;
