@@ -1,5 +1,6 @@
 // The library that is loaded for pictures and videos: OpenCV and FFmpeg, which throw: caught here.
 #include <dirent.h>
+#include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -7,9 +8,11 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <numeric>
 #include <vector>
 
@@ -121,7 +124,48 @@ class SceneChange {
   std::array<double, kGrid * kGrid> last_{};
 };
 
-/// One picture, or those of a folder in the order of their names.
+/// While it exists, nothing is printed on stderr, where codecs write by themselves. Other threads
+/// that print there wait.
+class SilentErrors {
+ public:
+  SilentErrors() : kept_(dup(STDERR_FILENO)), nowhere_(open("/dev/null", O_WRONLY | O_CLOEXEC)) {
+    flockfile(stderr);
+    if (kept_ >= 0 && nowhere_ >= 0) dup2(nowhere_, STDERR_FILENO);
+  }
+  SilentErrors(const SilentErrors&) = delete;
+  SilentErrors& operator=(const SilentErrors&) = delete;
+  ~SilentErrors() {
+    if (kept_ >= 0 && nowhere_ >= 0) dup2(kept_, STDERR_FILENO);
+    funlockfile(stderr);
+    if (kept_ >= 0) close(kept_);
+    if (nowhere_ >= 0) close(nowhere_);
+  }
+
+ private:
+  int kept_;
+  int nowhere_;
+};
+
+Result<void> read_picture(const std::string& path, Frame& frame) {
+  struct stat status {};
+  if (access(path.c_str(), R_OK) != 0 || stat(path.c_str(), &status) != 0) {
+    return fail(ExitCode::kIo, "input.open", path, std::strerror(errno), "check its permissions");
+  }
+  if (!S_ISREG(status.st_mode)) return damaged(path, "it is not a regular file");
+  if (status.st_size == 0) return damaged(path, "the file is empty");
+  try {
+    const SilentErrors silent;
+    const cv::Mat picture = cv::imread(path, cv::IMREAD_COLOR);
+    if (picture.empty()) return damaged(path, "the picture cannot be decoded");
+    fill(frame, picture);
+  } catch (const std::exception& error) {
+    return damaged(path, std::string("OpenCV: ") + error.what());
+  }
+  return {};
+}
+
+/// One picture, or those of a folder in the order of their names. Of several, those that cannot be
+/// read are skipped.
 class PictureSource final : public FrameSource {
  public:
   explicit PictureSource(std::vector<std::string> paths) : paths_(std::move(paths)) {}
@@ -131,26 +175,31 @@ class PictureSource final : public FrameSource {
   }
 
   Result<bool> next(Frame& frame) override {
-    if (stopped_ || next_ == paths_.size()) return false;
-    const std::string& path = paths_[next_];
-    try {
-      const cv::Mat picture = cv::imread(path, cv::IMREAD_COLOR);
-      if (picture.empty()) return damaged(path, "the picture cannot be decoded");
-      fill(frame, picture);
-    } catch (const std::exception& error) {
-      return damaged(path, std::string("OpenCV: ") + error.what());
+    for (; !stopped_ && next_ < paths_.size(); ++next_) {
+      if (const auto read = read_picture(paths_[next_], frame); !read) {
+        skipped_.push_back(read.error());
+        continue;
+      }
+      frame.new_scene = scene_.step(frame.gray_image());
+      frame.index = next_;
+      frame.time_s = static_cast<double>(next_) / kDefaultFps;
+      ++next_;
+      return true;
     }
-    frame.new_scene = scene_.step(frame.gray_image());
-    frame.index = next_;
-    frame.time_s = static_cast<double>(next_) / kDefaultFps;
-    ++next_;
-    return true;
+    if (skipped_.size() < paths_.size()) return false;
+    Error first = skipped_.front();
+    if (paths_.size() > 1) {
+      first.cause += "; none of the " + std::to_string(paths_.size()) + " pictures can be read";
+    }
+    return tl::unexpected(std::move(first));
   }
 
   void stop() override { stopped_ = true; }
+  [[nodiscard]] std::span<const Error> skipped() const override { return skipped_; }
 
  private:
   std::vector<std::string> paths_;
+  std::vector<Error> skipped_;
   SceneChange scene_;
   std::size_t next_ = 0;
   std::atomic<bool> stopped_{false};

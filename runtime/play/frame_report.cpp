@@ -248,6 +248,7 @@ std::string summary_line(const RunStats& stats) {
     object(writer, "summary", [&] {
       count(writer, "frames", stats.frames());
       count(writer, "dropped", stats.dropped());
+      count(writer, "skipped", stats.skipped());
       count(writer, "visible", stats.visible());
       number(writer, "recognised_percent", stats.recognised_percent());
       object(writer, "states", [&] {

@@ -81,9 +81,13 @@ class RunStats {
  public:
   void add(const FrameReport& report);
   void set_dropped(std::uint64_t dropped) { dropped_ = dropped; }
+  void set_skipped(std::uint64_t skipped) { skipped_ = skipped; }
 
   [[nodiscard]] std::uint64_t frames() const { return times_.size(); }
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
+  [[nodiscard]] std::uint64_t skipped() const {
+    return skipped_;
+  }  ///< pictures that cannot be read
   [[nodiscard]] std::uint64_t visible() const { return visible_; }  ///< frames with a detection
   [[nodiscard]] std::uint64_t late() const { return late_; }
   [[nodiscard]] std::uint64_t count(Shown state) const {
@@ -108,6 +112,7 @@ class RunStats {
   std::uint64_t visible_ = 0;
   std::uint64_t late_ = 0;
   std::uint64_t dropped_ = 0;
+  std::uint64_t skipped_ = 0;
   std::optional<CameraReport> camera_;
 };
 
@@ -126,8 +131,8 @@ bool draws_in_software(std::string_view gl_renderer);
 std::string frame_line(const FrameReport& report, std::span<const std::string> pattern_names,
                        bool homographies = false);
 
-/// {"summary":{frames,dropped,visible,recognised_percent,states,reasons,late,camera,ms}}; ms:
-/// medians, camera: of the last frame.
+/// {"summary":{frames,dropped,skipped,visible,recognised_percent,states,reasons,late,camera,ms}};
+/// ms: medians, camera: of the last frame.
 std::string summary_line(const RunStats& stats);
 
 /// {frame,model,angle_deg,triangles,draw_calls,ms:{render}}: a picture of the turntable. `pattern`

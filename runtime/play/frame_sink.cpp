@@ -1,6 +1,7 @@
 // Files and folders that outputs go to.
 #include <dirent.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <array>
 #include <cerrno>
@@ -86,6 +87,22 @@ void remove_frames(const std::string& folder) {
   for (const std::string& name : names_in(folder)) {
     if (is_frame(name)) std::remove((folder + "/" + name).c_str());
   }
+}
+
+NewFolders::NewFolders(const PlayOptions& options) {
+  const std::string frames = options.record.empty() ? "" : options.record + "/frames";
+  for (const std::string& path : {options.out, options.report, frames}) {
+    for (std::size_t end = path.find('/', 1); !path.empty(); end = path.find('/', end + 1)) {
+      struct stat status {};
+      const std::string part = path.substr(0, end);
+      if (stat(part.c_str(), &status) != 0) paths_.push_back(part);
+      if (end == std::string::npos) break;
+    }
+  }
+}
+
+void NewFolders::remove_empty() const {
+  for (auto path = paths_.rbegin(); path != paths_.rend(); ++path) rmdir(path->c_str());
 }
 
 Result<void> make_folder(const std::string& path) {

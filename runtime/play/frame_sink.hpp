@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "formats/base/error.hpp"
 #include "frame_report.hpp"
@@ -63,6 +64,17 @@ Result<void> check_outputs(const PlayOptions& options);
 
 /// Removes an earlier run's frame_NNNNNN.png or .ppm, which would stand among the new ones.
 void remove_frames(const std::string& folder);
+
+/// The folders that a run makes for its outputs: those without a file go when it fails.
+class NewFolders {
+ public:
+  /// Before any is made.
+  explicit NewFolders(const PlayOptions& options);
+  void remove_empty() const;
+
+ private:
+  std::vector<std::string> paths_;  ///< parents first
+};
 
 /// Makes a folder and its parents. Errors: kIo "out.create".
 Result<void> make_folder(const std::string& path);

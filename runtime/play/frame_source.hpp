@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -57,6 +58,8 @@ class FrameSource {
   virtual Result<bool> next(Frame& frame) = 0;
   /// Called from another thread: a next() that waits, and each later one, answers false.
   virtual void stop() = 0;
+  /// Pictures that next() has left out since they cannot be read. Not while next() runs.
+  [[nodiscard]] virtual std::span<const Error> skipped() const { return {}; }
 };
 
 /// input: a path, "camera" or "camera:N", or raw frames (see raw_source.hpp). Errors: kIo

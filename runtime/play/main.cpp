@@ -160,8 +160,11 @@ int start(int argc, char** argv) {
     const Result<void> printed = print_line(text.substr(0, text.size() - 1));
     return printed ? 0 : report(printed.error());
   }
+  const NewFolders folders(*options);
   const Result<int> done = run(*options);
-  return done ? *done : report(done.error());
+  if (done) return *done;
+  folders.remove_empty();
+  return report(done.error());
 }
 
 }  // namespace

@@ -185,9 +185,9 @@ Usage: modar-play BUNDLE --input VIDEO|IMAGE|FOLDER|camera[:N]|- [options]
        modar-play BUNDLE --turntable N --out FOLDER|FILE.mp4
 
 Input and output:
-  --input INPUT       a video, a picture, a folder of pictures (sorted by name), a camera, Y4M
-                      (- or FILE.y4m) or raw frames (nv21:640x480@30:FILE, with - for a pipe;
-                      also i420, nv12, yuyv, grey)
+  --input INPUT       a video, a picture, a folder of pictures (sorted by name; those that cannot
+                      be read are skipped), a camera, Y4M (- or FILE.y4m) or raw frames
+                      (nv21:640x480@30:FILE, with - for a pipe; also i420, nv12, yuyv, grey)
   --out OUT           write pictures to FILE.mp4, or to a folder as frame_000000.png ...
   --report FOLDER     write overlay.mp4, contact_sheet.png, frames.jsonl and index.html
   --window            show a window; its keys: Q or Escape quits, space pauses, M or the arrows

@@ -135,7 +135,9 @@ Result<PipelineCounts> run_pipeline(FrameSource& source, const TrackStep& track,
   if (lines.read_error) return tl::unexpected(*lines.read_error);
   if (lines.track_error) return tl::unexpected(*lines.track_error);
   if (!shown) return tl::unexpected(shown.error());
-  return PipelineCounts{lines.frames.dropped() + lines.jobs.dropped()};
+  const auto skipped = source.skipped();
+  return PipelineCounts{lines.frames.dropped() + lines.jobs.dropped(),
+                        {skipped.begin(), skipped.end()}};
 }
 
 }  // namespace modar

@@ -164,7 +164,8 @@ struct PipelineOptions {
 };
 
 struct PipelineCounts {
-  std::uint64_t dropped = 0;  ///< frames that a newer one replaced
+  std::uint64_t dropped = 0;   ///< frames that a newer one replaced
+  std::vector<Error> skipped;  ///< of pictures that cannot be read
 };
 
 /// Runs until the source ends, a step fails or the show step ends it; the threads are joined then.

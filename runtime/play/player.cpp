@@ -407,6 +407,10 @@ Result<int> Player::finish(const PipelineCounts& counts) {
                 "the run was interrupted before its first frame", "start it again");
   }
   stats_.set_dropped(counts.dropped);
+  stats_.set_skipped(counts.skipped.size());
+  for (const Error& error : counts.skipped) {
+    std::fprintf(stderr, "modar-play: skipped: %s\n", to_line(error).c_str());
+  }
   MODAR_TRY(finish_outputs(!interrupted));
   if (interrupted) {
     return fail(ExitCode::kIo, "play.interrupted", input_of(options_),
@@ -437,16 +441,18 @@ Result<void> Player::finish_outputs(bool whole) {
 
 std::string Player::summary_text() const {
   const StageTimes ms = stats_.median_ms();
+  const std::string skipped =
+      stats_.skipped() == 0 ? "" : "; skipped: " + std::to_string(stats_.skipped());
   char text[200];
-  std::snprintf(text, sizeof text,
-                "%llu frames, a pattern seen in %llu (%.1f %%), held in %llu; median ms: track "
-                "%.1f, render %.1f%s",
-                static_cast<unsigned long long>(stats_.frames()),
-                static_cast<unsigned long long>(stats_.visible()), stats_.recognised_percent(),
-                static_cast<unsigned long long>(stats_.count(Shown::kHeld)),
-                ms[static_cast<std::size_t>(Stage::kTrack)],
-                ms[static_cast<std::size_t>(Stage::kRender)],
-                draws_in_software(screen_->caps().renderer) ? " (in software)" : "");
+  std::snprintf(
+      text, sizeof text,
+      "%llu frames, a pattern seen in %llu (%.1f %%), held in %llu; median ms: track "
+      "%.1f, render %.1f%s%s",
+      static_cast<unsigned long long>(stats_.frames()),
+      static_cast<unsigned long long>(stats_.visible()), stats_.recognised_percent(),
+      static_cast<unsigned long long>(stats_.count(Shown::kHeld)),
+      ms[static_cast<std::size_t>(Stage::kTrack)], ms[static_cast<std::size_t>(Stage::kRender)],
+      draws_in_software(screen_->caps().renderer) ? " (in software)" : "", skipped.c_str());
   return text;
 }
 

@@ -118,10 +118,12 @@ TEST(JsonLines, TheSummaryCountsAndTakesMedians) {
   lost.at(Stage::kLatency) = 40;
   stats.add(lost);
   stats.set_dropped(2);
+  stats.set_skipped(3);
   const json summary = json::parse(summary_line(stats))["summary"];
   EXPECT_EQ(summary["frames"], 4);
   EXPECT_EQ(summary["visible"], 3);
   EXPECT_EQ(summary["dropped"], 2);
+  EXPECT_EQ(summary["skipped"], 3);
   EXPECT_EQ(summary["late"], 1);
   EXPECT_EQ(summary["recognised_percent"], 75.0);
   EXPECT_EQ(summary["reasons"], json({{"visible", 3}, {"not in view", 1}}));

@@ -1,5 +1,8 @@
 // Pictures and movies that the player writes, read back by OpenCV.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -70,6 +73,33 @@ TEST(Sinks, TheSamePicturesGiveTheSameBytes) {
     ASSERT_TRUE((*sink)->finish(""));
   }
   EXPECT_EQ(test::read_text(folder / "a.mp4"), test::read_text(folder / "b.mp4"));
+}
+
+/// A limit on the size of files: writes fail as on a full disk.
+TEST(Sinks, AFullDiskLeavesNoNewFolderWithoutAFile) {
+  const test::Folder folder;
+  PlayOptions options;
+  options.out = folder / "deep/er";
+  options.record = folder / "walk";
+  options.report = folder / "kept";
+  ASSERT_TRUE(make_folder(options.report));
+  const NewFolders made(options);
+  auto sink = open_frame_sink(options.out, 30);
+  ASSERT_TRUE(sink);
+  ASSERT_TRUE(make_folder(options.record + "/frames"));
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit none{0, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &none);
+  const auto written = (*sink)->picture({picture(5, 3, 2), 5, 3}, {});
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_FALSE(written);
+  test::write_text(options.record + "/frames/frame_000000.png", "");
+  made.remove_empty();
+  EXPECT_FALSE(std::filesystem::exists(folder / "deep"));
+  EXPECT_EQ(folder.count(), 2u) << "the older folder, and the one with a file";
 }
 
 TEST(Sinks, SayWhatTheyCannotTake) {

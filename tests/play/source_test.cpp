@@ -50,6 +50,51 @@ TEST(Source, AFolderComesInTheOrderOfItsNames) {
   EXPECT_FALSE(*(*source)->next(frame));
 }
 
+/// The first bytes of a picture of noise, which the decoder complains about on stderr.
+void write_torn(const std::string& path) {
+  cv::Mat noise(64, 64, CV_8UC3);
+  cv::randu(noise, 0, 255);
+  cv::imwrite(path, noise);
+  test::write_text(path, test::read_text(path).substr(0, 4000));
+}
+
+TEST(Source, PicturesOfAFolderThatCannotBeReadAreSkippedByName) {
+  const test::Folder folder;
+  write_torn(folder / "a.png");
+  cv::imwrite(folder / "b.png", flat(4, 4, {0, 0, 20}));
+  test::write_text(folder / "c.jpg", "");
+  test::write_text(folder / "d.bmp", "no picture");
+  cv::imwrite(folder / "e.png", flat(4, 4, {0, 0, 30}));
+  testing::internal::CaptureStderr();
+  auto source = open_frame_source(folder.path());
+  Frame frame;
+  for (const std::size_t index : {1U, 4U}) {
+    const auto more = (*source)->next(frame);
+    ASSERT_TRUE(more && *more);
+    EXPECT_EQ(frame.index, index);
+  }
+  const auto end = (*source)->next(frame);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << "what a codec prints";
+  ASSERT_TRUE(end) << to_line(end.error());
+  EXPECT_FALSE(*end);
+  ASSERT_EQ((*source)->skipped().size(), 3u);
+  EXPECT_EQ((*source)->skipped()[0].where, folder / "a.png");
+  EXPECT_EQ((*source)->skipped()[1].cause, "the file is empty");
+  EXPECT_EQ((*source)->skipped()[2].where, folder / "d.bmp");
+}
+
+TEST(Source, AFolderWithoutAReadablePictureIsAnError) {
+  const test::Folder folder;
+  write_torn(folder / "a.png");
+  write_torn(folder / "b.png");
+  auto source = open_frame_source(folder.path());
+  Frame frame;
+  const auto none = (*source)->next(frame);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().exit, ExitCode::kInvalidInput);
+  EXPECT_NE(none.error().cause.find("none of the 2 pictures"), std::string::npos);
+}
+
 TEST(Source, AVideoGivesEachFrameAtItsTime) {
   const test::Folder folder;
   {
