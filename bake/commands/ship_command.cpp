@@ -13,6 +13,7 @@
 #include <iterator>
 
 #include "bake/commands/ship_json.hpp"
+#include "bake/io/input.hpp"
 #include "bake/io/output.hpp"
 #include "bake/io/terminal.hpp"
 #include "bake/ship/http/http_reader.hpp"
@@ -34,6 +35,14 @@ Result<std::string> read_text(const std::string& path) {
     return fail(ExitCode::kIo, "io.open", path, std::strerror(errno), "check the path");
   }
   return std::string(std::istreambuf_iterator<char>(file), {});
+}
+
+/// A file of public keys, as `parse` reads its text.
+template <class Keys>
+Result<Keys> read_public(const std::string& path, Result<Keys> (*parse)(std::string_view)) {
+  MODAR_ASSIGN(const auto text, read_text(path));
+  auto keys = parse(text);
+  return keys ? std::move(keys) : in_file(path, keys.error());
 }
 
 std::string first_line(const std::string& text) {
@@ -137,8 +146,7 @@ struct KeyChange {
 
 Result<KeyChange> open_key_change(const RotateCommand& command) {
   MODAR_ASSIGN(auto key, load_key(command.key_file, command.pass_phrase_file));
-  MODAR_ASSIGN(const auto text, read_text(command.next_key));
-  MODAR_ASSIGN(const auto next, parse_public_key(text));
+  MODAR_ASSIGN(const auto next, read_public(command.next_key, parse_public_key));
   MODAR_ASSIGN(auto folder, ReleaseFolder::open(command.folder));
   return KeyChange{std::move(key), next, std::move(folder)};
 }
@@ -150,8 +158,7 @@ namespace {
 Result<RootSet> read_root_keys(const std::vector<std::string>& files, unsigned threshold) {
   std::vector<PublicKey> keys;
   for (const std::string& file : files) {
-    MODAR_ASSIGN(const auto text, read_text(file));
-    MODAR_ASSIGN(const auto key, parse_public_key(text));
+    MODAR_ASSIGN(const auto key, read_public(file, parse_public_key));
     keys.push_back(key);
   }
   return make_root_set(std::move(keys), threshold);
@@ -166,8 +173,7 @@ Result<std::string> write_draft(const RootCommand& command) {
     MODAR_ASSIGN(const auto roots, read_root_keys(command.roots, command.threshold));
     draft = draft_root_rotation(folder, roots);
   } else {
-    MODAR_ASSIGN(const auto text, read_text(command.next_key));
-    MODAR_ASSIGN(const auto next, parse_public_key(text));
+    MODAR_ASSIGN(const auto next, read_public(command.next_key, parse_public_key));
     MODAR_ASSIGN(draft, draft_root_metadata(folder, next));
   }
   MODAR_TRY(write_root_draft(command.draft, draft));
@@ -227,9 +233,7 @@ int run_sign(const SignCommand& command) {
 }
 
 int run_accept(const AcceptCommand& command) {
-  const auto trust = read_text(command.trust).and_then([](const std::string& text) {
-    return parse_root_set(text);
-  });
+  const auto trust = read_public(command.trust, parse_root_set);
   if (!trust) return print_error(trust.error());
   const auto folder = ReleaseFolder::open(command.folder);
   if (!folder) return print_error(folder.error());
@@ -400,9 +404,7 @@ int run_prune(const PruneCommand& command) {
 }
 
 int run_verify(const VerifyCommand& command) {
-  const auto key = read_text(command.trust).and_then([](const std::string& text) {
-    return parse_root_set(text);
-  });
+  const auto key = read_public(command.trust, parse_root_set);
   if (!key) return print_error(key.error());
   const auto read = is_web_address(command.place)
                         ? web_reader(command.place)

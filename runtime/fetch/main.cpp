@@ -12,6 +12,7 @@
 
 #include "formats/base/atomic_file.hpp"
 #include "modar/fetch.hpp"
+#include "modar/release.hpp"
 #include "runtime/platform/command_line.hpp"
 #include "store.hpp"
 
@@ -345,6 +346,10 @@ int run_fetch(CommandLine& line) {
   if (!key) {
     return answer({ExitCode::kIo, "io.open", line.trust_file, "it cannot be read",
                    "give the publisher's public key with --trust"});
+  }
+  if (auto trusted = parse_root_set(*key); !trusted) {
+    trusted.error().where = line.trust_file;
+    return answer(trusted.error());
   }
   line.options.trusted_key = *key;
   const bool bar = !line.quiet && !line.json && ::isatty(STDERR_FILENO) != 0;

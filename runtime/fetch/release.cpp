@@ -121,8 +121,12 @@ Result<PublicKey> parse_public_key(std::string_view text) {
   if (line.starts_with(kUntrusted)) line = parse_line(text);
   std::array<std::uint8_t, 42> bytes{};
   if (!from_base64(line, bytes) || bytes[0] != 'E' || bytes[1] != 'd') {
+    std::array<std::uint8_t, 158> secret{};
+    const bool is_secret = from_base64(line, secret) && secret[0] == 'E' && secret[1] == 'd';
     return fail(ExitCode::kInvalidInput, "key.public", "public key",
-                "it is not a minisign public key", "give the file K.pub of `modar ship keygen`");
+                is_secret ? "it is the secret key, which nobody but its owner may have"
+                          : "it is not a minisign public key",
+                "give the file K.pub of `modar ship keygen`");
   }
   PublicKey key;
   std::copy_n(bytes.begin() + 2, 8, key.id.begin());

@@ -170,6 +170,8 @@ class Publish(ShipTest):
         thief = self.folder / "thief"
         self.modar("ship", "keygen", "--out", thief)
         self.assert_fails(self.verify(trust=f"{thief}.pub"), 10, "signature.key")
+        for done in (self.verify(trust=thief), self.fetch(trust=thief)):
+            self.assert_fails(done, 3, str(thief), "secret key", "K.pub")
         (self.site / "releases" / "2.json.minisig").unlink()
         self.assert_fails(self.verify(), 13, "ship.absent", "2.json.minisig")
 

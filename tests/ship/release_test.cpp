@@ -118,6 +118,9 @@ TEST(Release, SecretKeysComeBack) {
   std::string damaged = *text;
   damaged[damaged.size() - 20] = damaged[damaged.size() - 20] == 'A' ? 'B' : 'A';
   EXPECT_FALSE(parse_secret_key(damaged, ""));
+  const auto mistaken = parse_public_key(*text);
+  ASSERT_FALSE(mistaken);
+  EXPECT_NE(mistaken.error().cause.find("secret key"), std::string::npos);
   const auto public_back = parse_public_key(public_key_text(key->public_key));
   ASSERT_TRUE(public_back);
   EXPECT_EQ(*public_back, key->public_key);

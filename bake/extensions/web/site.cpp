@@ -22,7 +22,6 @@
 #include "formats/check.hpp"
 #include "formats/pattern_shape.hpp"
 #include "modar/mapped_file.hpp"
-#include "modar/release.hpp"
 
 namespace modar {
 namespace {
@@ -410,10 +409,7 @@ Result<Json> release_of(const SiteOptions& options, const std::string& page) {
     return fail(ExitCode::kUnsupported, "web.page", page, "its engine was built without updates",
                 "scripts/sources.sh --libraries, then cmake --preset web and build it again");
   }
-  MODAR_ASSIGN(const MappedFile file, MappedFile::open(options.trusted_key));
-  MODAR_ASSIGN(
-      const RootSet key,
-      parse_root_set({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()}));
+  MODAR_ASSIGN(const RootSet key, trusted_keys(options));
   if (origin_of(options.release).find('@') != std::string::npos) {
     return fail(ExitCode::kUsage, "web.login", "--release",
                 "the address contains a user name or password, which the page would publish",
@@ -528,6 +524,13 @@ Result<void> put_entry(Draft& draft, const std::string& title) {
 }
 
 }  // namespace
+
+Result<RootSet> trusted_keys(const SiteOptions& options) {
+  MODAR_ASSIGN(const MappedFile file, MappedFile::open(options.trusted_key));
+  auto keys =
+      parse_root_set({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()});
+  return keys ? std::move(keys) : in_file(options.trusted_key, keys.error());
+}
 
 Result<std::string> find_page() {
   const fs::path programs = program_folder();

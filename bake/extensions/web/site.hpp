@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/base/error.hpp"
+#include "modar/release.hpp"
 
 namespace modar {
 
@@ -47,6 +48,9 @@ struct Site {
 /// The page installed with the programs, or built next to them.
 /// Errors: kUnsupported "web.page".
 Result<std::string> find_page();
+
+/// The keys of SiteOptions::trusted_key. Errors: kInvalidInput "key.public"; kIo.
+Result<RootSet> trusted_keys(const SiteOptions& options);
 
 /// Writes the folder. The same bundles and options give the same bytes. sw.js comes last: what a
 /// visitor keeps changes when all else is there. Errors: those of the bundles; kInvalidInput

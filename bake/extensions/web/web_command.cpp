@@ -36,10 +36,7 @@ void print_addresses(const WebCommand& command, const std::vector<std::string>& 
 
 /// The newest release at an address as the page sees it: of the folder that is written, or the web.
 Result<Release> release_at(const SiteOptions& options) {
-  MODAR_ASSIGN(const MappedFile file, MappedFile::open(options.trusted_key));
-  MODAR_ASSIGN(
-      const RootSet trusted,
-      parse_root_set({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()}));
+  MODAR_ASSIGN(const RootSet trusted, trusted_keys(options));
   if (!is_web_address(options.release)) {
     return newest_release(read_release_folder(options.output + "/" + options.release), trusted);
   }
