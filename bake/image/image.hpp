@@ -62,7 +62,8 @@ Result<Photo> read_photo(const std::string& path);
 Result<std::vector<std::byte>> encode_png(const RgbaImage& image, double width_mm = 0);
 /// The same to a file, atomically. Errors: also kIo "io.write".
 Result<void> write_png(const RgbaImage& image, const std::string& path, double width_mm = 0);
-/// The physical width that a PNG file's pHYs states, in mm; 0: none, or no readable PNG file.
+/// The physical width that a PNG file's pHYs states, in mm; 0: none, no readable PNG file, or 72,
+/// 96 or 144 pixels per inch, which programs write by default.
 double png_width_mm(const std::string& path);
 
 /// A progressive JPEG file without the alpha. quality: 1 to 100, as libjpeg counts. Errors:

@@ -1,5 +1,6 @@
 // PNG files through libpng, in and out. libpng reports errors by longjmp(): functions that call
 // setjmp() keep all that they change, and all that has a destructor, in an object of their caller.
+#include <algorithm>
 #include <cmath>
 #include <csetjmp>
 #include <cstdio>
@@ -49,6 +50,12 @@ void on_write(png_structp png, png_bytep from, std::size_t count) {
   png_error(png, "out of memory");
 }
 void on_flush(png_structp) {}
+
+/// Pixels per metre that programs store without being asked: those of 72, 96 and 144 per inch.
+bool is_default(std::uint32_t per_metre) {
+  constexpr std::uint32_t kDefaults[] = {2834, 2835, 3779, 3780, 5669, 5670};
+  return std::ranges::find(kDefaults, per_metre) != std::end(kDefaults);
+}
 
 class PngReader {
  public:
@@ -107,10 +114,10 @@ class PngReader {
     if (png_get_eXIf_1(png_, info_, &size, &exif) == 0) return {};
     return exif_facts(std::as_bytes(std::span(exif, size)));
   }
-  /// Of the picture's width; 0: not stated.
+  /// Of the picture's width; 0: not stated, or by a program's default.
   [[nodiscard]] double width_mm() const {
     const png_uint_32 per_metre = png_get_x_pixels_per_meter(png_, info_);
-    return per_metre == 0 ? 0 : width() * 1000.0 / per_metre;
+    return per_metre == 0 || is_default(per_metre) ? 0 : width() * 1000.0 / per_metre;
   }
 
  private:
@@ -192,11 +199,12 @@ double png_width_mm(const std::string& path) {
 Result<std::vector<std::byte>> encode_png(const RgbaImage& image, double width_mm) {
   const bool whole = image.width != 0 && image.height != 0 &&
                      image.pixels.size() == std::size_t{image.width} * image.height * 4;
-  const double per_metre = width_mm > 0 ? std::round(image.width * 1000.0 / width_mm) : 0;
-  const bool is_stored = per_metre >= 1 && per_metre <= PNG_UINT_31_MAX;
+  const double exact = width_mm > 0 ? std::round(image.width * 1000.0 / width_mm) : 0;
+  std::uint32_t per_metre =
+      exact >= 1 && exact < PNG_UINT_31_MAX ? static_cast<std::uint32_t>(exact) : 0;
+  while (is_default(per_metre)) ++per_metre;  // which a reader would ignore
   PngWriter writer;
-  if (!whole || !writer.write(image, !is_opaque(image),
-                              is_stored ? static_cast<std::uint32_t>(per_metre) : 0)) {
+  if (!whole || !writer.write(image, !is_opaque(image), per_metre)) {
     return fail(ExitCode::kInternal, "image.encode", "", "the image cannot be encoded as PNG",
                 "try a smaller one");
   }

@@ -226,14 +226,31 @@ TEST(PatternPng, KeepsPixelsAndPhysicalWidth) {
 
 TEST(PatternPng, ThePhysChunkIsByteForByteWhatThePngSpecificationAsksFor) {
   const RemoveAtEnd file{temporary("chunk.png")};
-  ASSERT_TRUE(write_png(waves(64, 64), file.path, 64.0 / 2835 * 1000));
+  ASSERT_TRUE(write_png(waves(64, 64), file.path, 64.0 / 11811 * 1000));
   std::ifstream stream(file.path, std::ios::binary);
-  const std::string bytes((std::istreambuf_iterator<char>(stream)), {});
-  // 2835 pixels a metre (72 dpi): a chunk, with its CRC, that many PNG files of other tools hold.
-  const unsigned char expected[] = {0,    0, 0, 9,    'p',  'H', 'Y',  's',  0,    0,   0x0B,
-                                    0x13, 0, 0, 0x0B, 0x13, 1,   0x00, 0x9A, 0x9C, 0x18};
-  EXPECT_NE(bytes.find(std::string(reinterpret_cast<const char*>(expected), sizeof expected)),
-            std::string::npos);
+  std::string bytes((std::istreambuf_iterator<char>(stream)), {});
+  // 11811 pixels a metre (300 dpi): a chunk, with its CRC, that many PNG files of other tools hold.
+  const unsigned char expected[] = {0,    0, 0, 9,    'p',  'H', 'Y',  's',  0,    0,   0x2E,
+                                    0x23, 0, 0, 0x2E, 0x23, 1,   0x78, 0xA5, 0x3F, 0x76};
+  const std::size_t at =
+      bytes.find(std::string(reinterpret_cast<const char*>(expected), sizeof expected));
+  ASSERT_NE(at, std::string::npos);
+  EXPECT_NEAR(png_width_mm(file.path), 64 / 11.811, 1e-9);
+  // 72 dpi: what programs write that nobody has told a size.
+  const unsigned char usual[] = {0,    0, 0, 9,    'p',  'H', 'Y',  's',  0,    0,   0x0B,
+                                 0x13, 0, 0, 0x0B, 0x13, 1,   0x00, 0x9A, 0x9C, 0x18};
+  bytes.replace(at, sizeof usual, reinterpret_cast<const char*>(usual), sizeof usual);
+  std::ofstream(file.path, std::ios::binary) << bytes;
+  EXPECT_EQ(png_width_mm(file.path), 0.0);
+}
+
+TEST(PatternPng, AStatedWidthComesBackEvenAtAUsualResolution) {
+  const RemoveAtEnd file{temporary("usual.png")};
+  for (const double dpi : {72.0, 96.0, 144.0}) {
+    const double width = 640 / dpi * 25.4;
+    ASSERT_TRUE(write_png(waves(640, 64), file.path, width));
+    EXPECT_NEAR(png_width_mm(file.path), width, 0.001 * width);
+  }
 }
 
 TEST(PatternPng, FilesWithoutASizeAnswerZero) {
