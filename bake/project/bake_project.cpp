@@ -13,10 +13,12 @@
 #include <set>
 
 #include "bake/bundle/link_bundles.hpp"
+#include "bake/bundle/scene/scene_placement.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/io/terminal.hpp"
 #include "bake/json.hpp"
 #include "bake/pattern/alike_patterns.hpp"
+#include "bake/pattern/pattern.hpp"
 #include "bake/project/file_digests.hpp"
 #include "bake/project/folder_names.hpp"
 #include "bake/project/interrupts.hpp"
@@ -100,9 +102,7 @@ class ProjectBake {
     for (Task& task : tasks_) plan(task);
     for (Target& target : targets_) plan(target);
     mark_wanted();
-    if (!options_.dry_run) {
-      MODAR_TRY(bake_and_link());
-    }
+    MODAR_TRY(options_.dry_run ? check_scenes() : bake_and_link());
     return outcome();
   }
 
@@ -356,7 +356,7 @@ class ProjectBake {
                                       [](const Target& target) { return target.fresh; })) {
       return digests_.learnt() ? write_state() : Result<void>();
     }
-    if (options_.only.empty()) MODAR_TRY(check_scenes());
+    MODAR_TRY(check_scenes());
     interrupts_ = std::make_unique<Interrupts>();
     bake(wanted);
     if (options_.only.empty()) {
@@ -373,12 +373,34 @@ class ProjectBake {
   /// A fault of a scene costs no bake.
   Result<void> check_scenes() const {
     for (const Target& target : targets_) {
-      if (target.fresh) continue;
+      if (target.fresh || !options_.only.empty()) continue;
+      if (target.models.empty() && target.patterns.empty()) {
+        return fail(ExitCode::kInvalidInput, "project.empty-bundle", target.path,
+                    "it would contain neither a model nor a pattern", "name existing ones");
+      }
       BakeRequest described;
       MODAR_TRY(describe_scenes(target, described));
+      for (const SceneRequest& scene : described.scenes) {
+        if (lacks_width(scene)) return no_width(scene);
+      }
+      for (const NodeRequest& node : described.nodes) {
+        if (!lacks_width(node.place)) continue;
+        Error error = no_width(node.place).value();
+        error.where = node.where;
+        return tl::unexpected(std::move(error));
+      }
       MODAR_TRY(check_nodes(described));
     }
     return {};
+  }
+
+  /// Does it give a length on a pattern of unknown width? The bake says what cannot be read.
+  [[nodiscard]] bool lacks_width(const SceneRequest& scene) const {
+    if (!needs_width(scene)) return false;
+    const auto pattern = std::ranges::find(project_.patterns, scene.pattern, &ProjectAsset::name);
+    if (pattern == project_.patterns.end() || pattern->width_mm > 0) return false;
+    const auto shaped = load_shaped(project_.path(pattern->file), 0, pattern->shape);
+    return shaped && !(shaped->width_mm > 0);
   }
 
   /// Large files first, so that no thread is left alone with one at the end.
@@ -523,10 +545,6 @@ class ProjectBake {
     described.tool_version = options_.tool_version;
     if (!project_.light.empty()) described.light = project_.path(project_.light);
     MODAR_TRY(describe_scenes(target, described));
-    if (models.empty() && patterns.empty()) {
-      return fail(ExitCode::kInvalidInput, "project.empty-bundle", target.path,
-                  "it would contain neither a model nor a pattern", "name existing ones");
-    }
     const auto media = [&](const NodeRequest& node) { return media_of(node, target, described); };
     MODAR_ASSIGN(BundleContent content, link_bundles(models, patterns, described, media));
     add_texts(target, content);

@@ -156,7 +156,7 @@ class Files(ProjectTest):
             ("[bake]\ndevice = \"ace3\"\n", "modar.toml:2", "ace2", "project.value"),
             ("[[model]]\nfile = \"*.fbx\"\n", "modar.toml:2", "'*.fbx'", "project.no-match"),
             ("[[model]]\nwidth = 3\n", "modar.toml:2", "there is no key 'width'", "project.key"),
-            ("[[model]]\nfile = [\"models/a.obj\", \"models/a.obj\"]\n", "modar.toml:2", "'a'", "project.same-name"),
+            ("[[model]]\nfile = [\"models/a.obj\", \"models/a.obj\"]\n", "modar.toml:2", "models/a.obj is listed twice", "project.same-name"),
             ("[[pattern]]\nfile = \"pictures/a.png\"\n[[scene]]\npattern = \"aa\"\n", "modar.toml:4", "did you mean 'a'",
              "project.scene-unknown"),
             ("[bake\n", "modar.toml:1", "project.toml"),
@@ -171,6 +171,14 @@ class Files(ProjectTest):
             self.assert_fails(self.modar("bake", option, cwd=self.place), 1, "bake.project-option")
         self.assert_fails(self.modar("bake", "--model", POTTERY, "-o", "x.modar", "--explain"), 1, "bake.project-option")
         self.assert_fails(self.modar("bake", "--model", POTTERY), 1, "-o")
+
+    def test_a_dry_run_refuses_what_the_bake_refuses(self):
+        head = "[[model]]\nfile = \"models/b.obj\"\n[[pattern]]\nfile = \"pictures/a.png\"\n[[scene]]\npattern = \"a\"\n"
+        for scene in ("model = \"b\"\n", "[[scene.picture]]\nfile = \"pictures/a.png\"\n"):
+            self.write(head + scene + "height = \"80mm\"\n")
+            for words in ((), ("--dry-run",)):
+                with self.subTest(scene=scene, words=words):
+                    self.assert_fails(self.modar("bake", *words, cwd=self.place), 1, "scene.no-width")
 
     def test_the_schema_knows_the_keys_of_the_program(self):
         tables = {key: value.get("items", value)["properties"] for key, value in SCHEMA["properties"].items()}
