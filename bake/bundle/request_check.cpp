@@ -40,12 +40,19 @@ Result<void> name_files(std::vector<Asset>& assets, const char* what) {
   for (const Asset& asset : assets) {
     if (asset.name.empty()) ++stems[file_stem(asset.path)];
   }
-  std::set<std::string> taken;
+  std::map<std::string, std::string> taken;  // files by name
   for (Asset& asset : assets) {
     const std::string stem = file_stem(asset.path);
     if (asset.name.empty()) asset.name = stems[stem] > 1 ? folder_name(asset.path) : stem;
     if (asset.name.empty()) asset.name = stem;
-    if (taken.insert(asset.name).second) continue;
+    const auto [first, fresh] = taken.try_emplace(asset.name, asset.path);
+    if (fresh) continue;
+    std::error_code error;
+    if (fs::equivalent(first->second, asset.path, error)) {
+      return fail(ExitCode::kUsage, "bake.twice", asset.path, "the file is given twice",
+                  std::string("name it once; to bake it twice, give one another name: --") + what +
+                      " NAME=" + asset.path);
+    }
     return fail(ExitCode::kUsage, "bake.same-name", asset.path,
                 std::string("two ") + what + "s are named '" + asset.name + "'",
                 std::string("give one of them a name: --") + what + " NAME=" + asset.path);

@@ -502,9 +502,13 @@ class ProjectReader {
         asset.file = file;
         asset.name = name.empty() ? file_stem(file) : name;
         if (!seen.insert(asset.name).second) {
+          const bool twice = std::ranges::any_of(
+              assets, [&](const ProjectAsset& one) { return one.file == file; });
           return fail(ExitCode::kInvalidInput, "project.same-name", reader.at("file"),
-                      "two files are named '" + asset.name + "', the second is " + file,
-                      "give each its own table with a different name = \"...\"");
+                      twice ? file + " is listed twice"
+                            : "two files are named '" + asset.name + "', the second is " + file,
+                      twice ? "list it once, or name it otherwise in a table of its own"
+                            : "give each its own table with a different name = \"...\"");
         }
         assets.push_back(asset);
       }

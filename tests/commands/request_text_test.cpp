@@ -108,6 +108,10 @@ TEST(Name, TheFoldersWhereFilesAreCalledAlike) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, "bake.same-name");
   EXPECT_EQ(refused.error().cure, "give one of them a name: --model NAME=b/x/scene.gltf");
+  request.models = {ModelRequest("/usr"), ModelRequest("/usr/../usr")};  // any that is there
+  const auto twice = name_assets(request);
+  ASSERT_FALSE(twice);
+  EXPECT_EQ(twice.error().cause, "the file is given twice");
 }
 
 TEST(Corners, EightNumbersAndNothingElse) {
