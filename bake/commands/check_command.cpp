@@ -9,6 +9,7 @@
 #include "bake/check/content/content_check.hpp"
 #include "bake/check/device/device_file.hpp"
 #include "bake/check/verdict.hpp"
+#include "bake/io/input.hpp"
 #include "bake/io/terminal.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/device_profile.hpp"
@@ -114,6 +115,9 @@ int run_check(const CheckCommand& command) {
   if (!device) return print_error(device.error());
   Result<MappedFile> file = MappedFile::open(command.bundle);
   if (!file) return print_error(file.error());
+  if (const auto is = require_kind(FileKind::kBundle, command.bundle); !is) {
+    return print_error(is.error());
+  }
 
   const IssueSink sink = [&verdict](const Issue& issue) { verdict.add(issue); };
   const bool sound = check_whole(file->bytes(), *device, sink);

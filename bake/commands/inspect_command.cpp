@@ -101,6 +101,7 @@ void print_table(const BundleView& bundle, const std::string& path) {
 
 Result<ExitCode> run_inspect(const InspectCommand& command) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(command.bundle));
+  MODAR_TRY(require_kind(FileKind::kBundle, command.bundle));
   Result<BundleView> bundle = BundleView::open(file.bytes());
   if (!bundle) return file.settle(Result<ExitCode>(in_file(command.bundle, bundle.error())));
   if (!command.extract.empty()) {

@@ -32,7 +32,23 @@ constexpr Signature kSignatures[] = {{"\x89PNG\r\n"sv, 0, FileKind::kPicture, "P
                                      {"glTF"sv, 0, FileKind::kModel, "glTF"},
                                      {"ply\n"sv, 0, FileKind::kModel, "PLY"},
                                      {"ply\r"sv, 0, FileKind::kModel, "PLY"},
-                                     {"solid "sv, 0, FileKind::kModel, "STL"}};
+                                     {"solid "sv, 0, FileKind::kModel, "STL"},
+                                     {"\x89MOD\r\n"sv, 0, FileKind::kBundle, "ModAR"}};
+
+struct KindWords {
+  const char* noun;
+  const char* code;
+  const char* cure;  ///< where a model or a picture is wanted
+};
+/// By FileKind.
+constexpr KindWords kKinds[] = {
+    {"model", "model",
+     "pass it as a model, with the ending of one; patterns are PNG, JPEG, WebP, TIFF, BMP and TGA "
+     "files"},
+    {"picture", "image",
+     "pass it as a pattern, with the ending of a picture; models are glTF, OBJ, PLY and STL files"},
+    {"bundle", "bundle",
+     "`modar check`, `inspect`, `report` and `web` and modar-play take it; bake its sources"}};
 
 /// An STL or OBJ file need not begin with words of its own. The size of a binary STL follows from
 /// its number of triangles; of the others the name says what they are.
@@ -61,20 +77,18 @@ Result<void> require_kind(FileKind wanted, std::string_view start, const std::st
     return start.size() > one.at && start.substr(one.at).starts_with(one.bytes);
   });
   const bool known = found != std::end(kSignatures);
-  if (wanted == FileKind::kModel) {
-    if (!known || found->kind == wanted) return {};
-    return fail(ExitCode::kUsage, "model.picture", path,
-                std::string("this is a picture (") + found->name + "), not a model",
-                "pass it as a pattern, with the ending of a picture; models are glTF, OBJ, PLY and "
-                "STL files");
-  }
-  const char* model =
-      known ? (found->kind == wanted ? nullptr : found->name) : unsigned_model(start, path);
-  if (model == nullptr) return {};
-  return fail(ExitCode::kUsage, "image.model", path,
-              std::string("this is a model (") + model + "), not a picture",
-              "pass it as a model, with the ending of one; patterns are PNG, JPEG, WebP, TIFF, BMP "
-              "and TGA files");
+  const FileKind kind = known ? found->kind : FileKind::kModel;
+  if (kind == wanted) return {};
+  const char* format = known ? found->name : unsigned_model(start, path);
+  if (format == nullptr) return {};
+  const auto words_of = [](FileKind one) { return kKinds[static_cast<std::size_t>(one)]; };
+  const bool bakes = wanted == FileKind::kBundle;
+  return fail(ExitCode::kUsage, std::string(words_of(wanted).code) + "." + words_of(kind).noun,
+              path,
+              std::string("this is a ") + words_of(kind).noun + " (" + format + "), not a " +
+                  words_of(wanted).noun,
+              bakes ? "bake it first, as in `modar bake model.glb picture.png -o name.modar`"
+                    : words_of(kind).cure);
 }
 
 Result<void> require_kind(FileKind wanted, const std::string& path) {

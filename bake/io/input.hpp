@@ -26,9 +26,9 @@ bool is_inside(const std::string& folder, const std::filesystem::path& path);
 Result<std::string> read_file(const std::string& path, std::size_t most);
 
 /// Refuses a file of another kind by its first bytes: an empty file, a picture where a
-/// model is wanted, a model where a picture is. start: at least 16 bytes, or the whole file.
-/// Errors: kInvalidInput "io.empty"; kUsage "model.picture", "image.model".
-enum class FileKind : std::uint8_t { kModel, kPicture };
+/// model is wanted, and so on. start: at least 16 bytes, or the whole file. Errors: kInvalidInput
+/// "io.empty"; kUsage "model.picture", "image.model" and so on: the wanted kind, the found one.
+enum class FileKind : std::uint8_t { kModel, kPicture, kBundle };
 Result<void> require_kind(FileKind wanted, std::string_view start, const std::string& path);
 /// The same of a file that can be opened.
 Result<void> require_kind(FileKind wanted, const std::string& path);

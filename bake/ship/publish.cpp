@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <set>
 
+#include "bake/io/input.hpp"
 #include "bake/io/output.hpp"
 #include "bake/ship/release_folder.hpp"
 #include "formats/check.hpp"
@@ -23,6 +24,7 @@ struct OpenBundle {
 
 Result<OpenBundle> open_bundle(const std::string& path) {
   MODAR_ASSIGN(auto file, MappedFile::open(path));
+  MODAR_TRY(require_kind(FileKind::kBundle, path));
   if (const std::string error = first_error(file.bytes()); !error.empty()) {
     return fail(ExitCode::kInvalidInput, "ship.bad-bundle", path, error,
                 "see `modar check " + path + "`, and bake it again");

@@ -136,6 +136,15 @@ class WrongFiles(ProgramTest):
         picture(self.folder / "good.png")
         (self.folder / "good.stl").write_text(STL)
 
+    def test_bundles_and_other_files_are_told_apart(self):
+        shutil.copy(ROOT / "tests/golden/v1_0.modar", self.folder / "b.png")
+        self.assert_fails(self.modar("pattern", "score", "b.png"), 1, "this is a bundle (ModAR), not a picture; `modar check`")
+        self.assert_fails(self.modar("bake", "b.png", "good.stl", "-o", "out.modar"), 1, "this is a bundle (ModAR), not a picture")
+        self.modar("ship", "keygen", "--out", "k.key")
+        publish = ("ship", "publish", "good.png", "--to", "ar", "--key", "k.key", "--dry-run")
+        for words in (("check", "good.png"), ("inspect", "good.png"), ("report", "good.png", "-o", "r.html"), publish):
+            self.assert_fails(self.modar(*words), 1, "this is a picture (PNG), not a bundle; bake it first")
+
     def test_an_empty_file_is_called_empty(self):
         for name in ("zero.obj", "zero.glb", "zero.gltf", "zero.stl", "zero.ply", "zero.png", "zero.jpg", "zero.webp"):
             (self.folder / name).touch()

@@ -10,6 +10,7 @@
 
 #include "bake/image/decoders.hpp"
 #include "bake/image/difference.hpp"
+#include "bake/io/input.hpp"
 #include "tests/texture/texture_samples.hpp"
 
 namespace modar {
@@ -92,6 +93,20 @@ TEST_P(ImageKinds, ReadsLosslessKindsAndRefusesEveryTruncation) {
 
 INSTANTIATE_TEST_SUITE_P(All, ImageKinds,
                          testing::Values(".png", ".jpg", ".bmp", ".webp", ".tiff"));
+
+TEST(FileKind, SaysWhatAFileIs) {
+  const auto code = [](FileKind wanted, std::string_view start) {
+    const auto is = require_kind(wanted, start, "a.modar");
+    return is ? "" : is.error().code;
+  };
+  const std::string_view png("\x89PNG\r\n\x1A\n........", 16);
+  const std::string_view bundle("\x89MOD\r\n\x1A\n........", 16);
+  EXPECT_EQ(code(FileKind::kPicture, bundle), "image.bundle");
+  EXPECT_EQ(code(FileKind::kModel, bundle), "model.bundle");
+  EXPECT_EQ(code(FileKind::kBundle, png), "bundle.picture");
+  EXPECT_EQ(code(FileKind::kBundle, bundle), "");
+  EXPECT_EQ(code(FileKind::kBundle, "MOD and no more.."), "") << "its reader says more";
+}
 
 TEST(ImageReader, KeepsAlphaAndNarrowsSixteenBits) {
   cv::Mat deep(2, 2, CV_16UC4);

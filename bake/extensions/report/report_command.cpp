@@ -31,6 +31,7 @@ Result<ExitCode> run_report(ReportCommand& command) {
   }));
   MODAR_TRY(try_output(command.output, 0));
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(command.bundle));
+  MODAR_TRY(require_kind(FileKind::kBundle, command.bundle));
   const Result<BundleView> bundle = BundleView::open(file.bytes());
   if (!bundle) return file.settle(Result<ExitCode>(in_file(command.bundle, bundle.error())));
   command.options.title = std::filesystem::path(command.bundle).filename().string();

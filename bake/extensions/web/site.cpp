@@ -301,6 +301,7 @@ Result<std::string> put_bytes(Draft& draft, const std::string& stem,
 /// Before anything is written: each bundle is whole, and has what a camera could find.
 Result<void> check_bundle_file(const std::string& path) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
+  MODAR_TRY(require_kind(FileKind::kBundle, path));
   const Result<BundleView> bundle = BundleView::open(file.bytes());
   if (!bundle) return file.settle(Result<void>(in_file(path, bundle.error())));
   if (const auto whole = verify_sections(*bundle); !whole) return in_file(path, whole.error());
