@@ -149,6 +149,13 @@ class Gate(StudioTest):
         self.assertEqual((texture["missing"], [one["file"] for one in texture["project"]["patterns"]]), ([], ["a.png"]))
         self.assertEqual([one["file"] for one in texture["project"]["models"]], ["pot/pottery.obj"])
 
+    def test_a_file_that_a_model_misses_goes_next_to_the_model(self):
+        self.good(self.running.put("pot.zip", zip_of(("pottery.obj", POTTERY.read_bytes()))))
+        for name, missing in (("pottery.mtl", ["pot/pottery.png"]), ("pottery.png", [])):
+            added = self.good(self.running.put(name, POTTERY.with_name(name).read_bytes()))
+            self.assertEqual(added["added"], [f"pot/{name}"])
+            self.assertEqual([one["missing"] for one in added["project"]["models"]], [missing])
+
     def test_a_texture_that_came_first_is_no_picture(self):
         project = self.good(self.running.put("pottery.png", POTTERY.with_suffix(".png").read_bytes()))["project"]
         self.assertEqual(len(project["patterns"]), 2)

@@ -178,6 +178,19 @@ Result<std::string> listed_text(const Session& session, const std::string& text,
   return text_with_assets(now, session.file, assets);
 }
 
+/// Where a file without a folder goes: where a model in a folder of the project misses it, else to
+/// the project's root.
+std::string place_of(const Session& session, const std::string& name) {
+  const auto found = find_assets(session.folder);
+  if (!found || name.find('/') != std::string::npos) return name;
+  for (const std::string& model : found->models) {
+    for (const std::string& missing : missing_of(session, model)) {
+      if (fs::path(missing).filename() == name && check_name(missing)) return missing;
+    }
+  }
+  return name;
+}
+
 Result<Json> add_upload(Session& session, const std::string& upload, const std::string& name) {
   MODAR_TRY(check_name(name));
   if (name == kProjectFile) {
@@ -189,7 +202,7 @@ Result<Json> add_upload(Session& session, const std::string& upload, const std::
   if (archive) {
     MODAR_ASSIGN(files, settle_archive(session, upload, name));
   } else {
-    MODAR_ASSIGN(files.emplace_back(), settle(session, upload, name));
+    MODAR_ASSIGN(files.emplace_back(), settle(session, upload, place_of(session, name)));
   }
   Json problems = Json::array();
   MODAR_ASSIGN(const ProjectText::State before, session.text.read());
