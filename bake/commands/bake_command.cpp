@@ -114,15 +114,6 @@ Result<void> complete(BakeCommand& command) {
   return name_assets(request);
 }
 
-/// What of the files is not in the bundle and would be missed, as the last lines.
-void print_losses(const Report& report) {
-  for (const Diagnostic& d : report.diagnostics) {
-    const bool lost = d.id == "model.lost" || d.id.ends_with("missing-map") ||
-                      d.id.ends_with("missing-image") || d.id.ends_with("missing-texture");
-    if (lost) std::fprintf(stderr, "not complete: %s\n", printable(d.message).c_str());
-  }
-}
-
 void print_summary(const BundleView& bundle, const Report& report, const std::string& path) {
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
     const ModelRecord& model = bundle.models()[m];
@@ -282,7 +273,7 @@ Result<ExitCode> run_bake(BakeCommand& command, const std::vector<std::string>& 
   bar.clear();
   if (!command.quiet) {
     print_summary(bundle, report, command.output);
-    print_losses(report);
+    print_losses(report.diagnostics);
   }
   if (command.json) std::fputs(bake_json(bundle, report).dump().c_str(), stdout);
   return ExitCode::kOk;

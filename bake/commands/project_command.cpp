@@ -160,6 +160,7 @@ void print_outcome(const ProjectOutcome& outcome, bool explain, bool dry_run, bo
     if (const auto view = BundleView::open(file->bytes())) print_scenes(*view);
   }
   std::fprintf(stderr, "%s\n", counts_of(outcome).c_str());
+  print_losses(outcome.diagnostics);
 }
 
 }  // namespace

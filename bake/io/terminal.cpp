@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -154,6 +155,20 @@ void print_group(const std::vector<const Diagnostic*>& group, std::size_t whole)
 }
 
 }  // namespace
+
+void print_losses(const std::vector<Diagnostic>& findings) {
+  std::set<std::string> said;
+  for (const Diagnostic& d : findings) {
+    constexpr std::array<std::string_view, 4> kEnds = {"missing-map", "missing-image",
+                                                       "missing-texture", "missing-mtl"};
+    const bool lost = d.id == "model.lost" || d.id.starts_with("image.") ||
+                      std::ranges::any_of(kEnds, [&](auto end) { return d.id.ends_with(end); });
+    if (!lost || d.severity == DiagnosticSeverity::kInfo) continue;
+    const std::string what = d.id.starts_with("image.") ? "'" + d.file + "': " : "";
+    if (!said.insert(what + d.message).second) continue;
+    std::fprintf(stderr, "not complete: %s\n", printable(what + d.message).c_str());
+  }
+}
 
 void print_findings(const std::vector<Diagnostic>& findings, bool all) {
   // A warning is the same one however often it is found in a file.

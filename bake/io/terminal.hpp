@@ -55,6 +55,9 @@ int finish_output(int code);
 /// All findings of a bake on stderr, each once: notes first, warnings after them, errors last. Of
 /// many of one kind the first are shown and the others counted, unless `all` are wanted.
 void print_findings(const std::vector<Diagnostic>& findings, bool all);
+/// What of the files is not in a bundle and would be missed, on stderr, as a bake's last lines:
+/// many faces, or a texture or material file that is missing or cannot be read.
+void print_losses(const std::vector<Diagnostic>& findings);
 /// "warning: file:line: message; cure [id]" on stderr.
 void print_diagnostic(const Diagnostic& diagnostic);
 

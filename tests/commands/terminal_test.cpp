@@ -24,6 +24,23 @@ TEST(TimeLeft, ComesFromThePartThatIsDone) {
   EXPECT_EQ(time_left(1, 60), "");
 }
 
+TEST(Losses, AreTheTexturesAndManyFacesOfAModelEachOnce) {
+  constexpr auto kWarning = DiagnosticSeverity::kWarning;
+  const std::vector<Diagnostic> findings = {
+      {"mtl.missing-map", kWarning, "a.mtl", 3, "texture 'a.png' was not found", ""},
+      {"mtl.missing-map", kWarning, "a.mtl", 7, "texture 'a.png' was not found", ""},
+      {"model.lost", kWarning, "a", 0, "2 of 30 faces could not be used", ""},
+      {"model.degenerate", kWarning, "a", 0, "9 triangles without area left out", ""},
+      {"image.decode", kWarning, "b.png", 0, "it is cut short; grey replaces it", ""},
+      {"image.decode", DiagnosticSeverity::kInfo, "c.png", 0, "it is large", ""}};
+  testing::internal::CaptureStderr();
+  print_losses(findings);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "not complete: texture 'a.png' was not found\n"
+            "not complete: 2 of 30 faces could not be used\n"
+            "not complete: 'b.png': it is cut short; grey replaces it\n");
+}
+
 TEST(ProcessCost, IsPositive) {
   EXPECT_GT(process_cost().peak_rss_bytes, 100000u);
 }
