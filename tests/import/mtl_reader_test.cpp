@@ -93,6 +93,9 @@ TEST_F(MtlReader, OptionsAreNoPartOfTheName) {
   EXPECT_EQ(found("-s 0.5 wood.jpg"), "wood.jpg");
   EXPECT_TRUE(transformed_);
   EXPECT_EQ(found("-mm 0.1 0.3 -texres 512 two words.png"), "two words.png");
+  EXPECT_TRUE(transformed_);
+  EXPECT_EQ(found("-mm 0 1.0 wood.jpg"), "wood.jpg");
+  EXPECT_FALSE(transformed_);
   EXPECT_EQ(found("-imfchan r wood.jpg -bm 1.5"), "wood.jpg");
   EXPECT_EQ(found("-unknown hello world -single two words.png"), "two words.png");
 }
@@ -119,6 +122,43 @@ TEST_F(MtlReader, ReadsProperties) {
   EXPECT_EQ(findings_[0].id, "mtl.missing-map");
   EXPECT_EQ(findings_[0].line, 16u);
   EXPECT_EQ(findings_[1].id, "mtl.invisible");
+}
+
+// Tile 1001 + u + 10 v has the uvs from (u, v) on, as Blender, Mari and others number them.
+TEST_F(MtlReader, FacesShowTheTileThatTheyAreIn) {
+  for (const char* name : {"skin.1002.png", "skin.1011.png"}) std::ofstream(folder_ / name) << "x";
+  std::ofstream(folder_ / "m.mtl") << "newmtl plain\nKd 1 0 0\nnewmtl skin\nKd 0 0 0\n"
+                                      "map_Kd -s 0.5 1 1 -o 0 0.25 0 Skin.<UDIM>.png\n";
+  const auto model = parse_obj(
+      "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"
+      "vt 2 0\nvt 4 0\nvt 2 0.5\n"        // times and plus the above: from (1, 0.25), in 1002
+      "vt 0 0.75\nvt 1 0.75\nvt 0 1.5\n"  // from (0, 1), in 1011
+      "vt 4 0\nvt 5 0\nvt 4 0.5\n"        // in 1003
+      "vt -2 0\nvt -1 0\nvt -2 0.5\n"     // in none
+      "usemtl skin\nf 1/1 2/2 3/3\nf 1/4 2/5 3/6\nusemtl plain\nf 1/1 2/2 3/3\n"
+      "usemtl skin\nf 1/7 2/8 3/9\nf 1/10 2/11 3/12\nf 1/4 2/5 3/6\n",
+      folder_.string() + "/", "m.obj");
+  ASSERT_TRUE(model) << to_line(model.error());
+  std::vector<std::string> maps;
+  RunCursor materials(model->material_runs);
+  for (std::size_t f = 0; f < model->face_count(); ++f) {
+    maps.push_back(fs::path(model->materials[materials.at(f)].diffuse_map).filename().string());
+  }
+  EXPECT_EQ(maps, (std::vector<std::string>{"skin.1002.png", "skin.1011.png", "", "", "",
+                                            "skin.1011.png"}));
+  const auto uv = [&](std::size_t corner) { return model->uvs[model->corner(corner).uv]; };
+  EXPECT_EQ(uv(0), glm::dvec2(0, 0.25));
+  EXPECT_EQ(uv(1), glm::dvec2(1, 0.25));
+  EXPECT_EQ(uv(3), glm::dvec2(0, 0));
+  EXPECT_EQ(uv(5), glm::dvec2(0, 0.75));
+  EXPECT_EQ(uv(6), glm::dvec2(2, 0)) << "another material's";
+  std::vector<std::string> said;
+  for (const Diagnostic& d : model->diagnostics) {
+    if (d.id == "mtl.missing-map") said.push_back(d.message);
+  }
+  EXPECT_EQ(said,
+            (std::vector<std::string>{"tile 'skin.1003.png' of 1 faces was not found",
+                                      "tile 'beyond 1001 to 1100' of 1 faces was not found"}));
 }
 
 TEST_F(MtlReader, NormalMapsHaveSeveralNames) {

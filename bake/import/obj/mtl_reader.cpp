@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <iterator>
 #include <map>
@@ -13,6 +14,7 @@
 
 #include "bake/image/image.hpp"
 #include "bake/import/name_form.hpp"
+#include "bake/import/obj/map_places.hpp"
 #include "bake/import/obj/number_parser.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/import/reflection.hpp"
@@ -102,11 +104,16 @@ std::string cleaned(std::string_view name) {
   return clean;
 }
 
-bool is_number(std::string_view token) {
-  if (!token.empty() && token.front() == '+') token.remove_prefix(1);
+/// The number that a word states, or `other`.
+double number_of(std::string_view word, double other) {
+  if (word.starts_with('+')) word.remove_prefix(1);
   double value = 0;
-  const auto result = std::from_chars(token.data(), token.data() + token.size(), value);
-  return result.ec == std::errc() && result.ptr == token.data() + token.size();
+  const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
+  return result.ec == std::errc() && result.ptr == word.data() + word.size() ? value : other;
+}
+
+bool is_number(std::string_view word) {
+  return !std::isnan(number_of(word, std::nan("")));
 }
 
 /// Removes the first word of `text` and returns it.
@@ -132,9 +139,7 @@ std::string_view without_options(std::string_view text, bool& transformed, MapPl
         std::string_view after = rest;
         const std::string_view word = parse_word(after);
         if (!is_number(word) || after.empty()) break;
-        double value = neutral;
-        const std::size_t sign = word.front() == '+' ? 1 : 0;
-        std::from_chars(word.data() + sign, word.data() + word.size(), value);
+        const double value = number_of(word, neutral);
         if (place != nullptr && name != "t") {
           if (i < 2) (name == "s" ? place->scale : place->offset)[i] = value;
         } else {
@@ -143,8 +148,10 @@ std::string_view without_options(std::string_view text, bool& transformed, MapPl
         rest = after;
       }
     } else if (name == "mm") {
-      parse_word(rest);
-      parse_word(rest);
+      for (const double neutral : {0.0, 1.0}) {
+        const bool usual = number_of(parse_word(rest), neutral) == neutral;
+        transformed = transformed || !usual;
+      }
     } else if (name == "blendu" || name == "blendv" || name == "clamp" || name == "cc" ||
                name == "imfchan" || name == "texres" || name == "bm" || name == "boost" ||
                name == "type") {
@@ -282,6 +289,7 @@ void parse_map(std::string_view text, MtlContext& context, std::string& path,
   std::string name;
   bool transformed = false;
   path = find_map_file(text, context.folder, name, transformed, place);
+  if (path.empty() && place != nullptr) path = find_tiles(name, context.folder);
   if (path.empty()) {
     if (context.missing != nullptr) {
       context.missing->push_back((fs::path(context.folder.path) / name).string());
@@ -293,10 +301,10 @@ void parse_map(std::string_view text, MtlContext& context, std::string& path,
   }
   note_place(name, path, context.folder, context.label, context.line, context.diagnostics);
   if (transformed) {
-    context.diagnostics.push_back({"mtl.map-transform", DiagnosticSeverity::kWarning, context.label,
-                                   context.line,
-                                   "options that shift or scale the texture are ignored",
-                                   "apply them to the vt lines in the modelling program"});
+    context.diagnostics.push_back(
+        {"mtl.map-transform", DiagnosticSeverity::kWarning, context.label, context.line,
+         "options that disturb the texture or scale its values (-t, -mm) are ignored",
+         "apply them in the modelling program"});
   }
 }
 
@@ -518,36 +526,6 @@ void forget_mean_colours(const std::string& label, SourceModel& model) {
        ""});
 }
 
-/// Gives the corners of materials whose maps are scaled or shifted uvs of their own.
-void place_maps(SourceModel& model) {
-  const auto moved = [](const SourceMaterial& m) { return m.place != MapPlace(); };
-  if (model.uvs.empty() || std::ranges::none_of(model.materials, moved)) return;
-  if (model.corner_uvs.kind != IndexPlane::Kind::kOwn) {
-    const bool same = model.corner_uvs.kind == IndexPlane::Kind::kSame;
-    if (!same) return;
-    model.corner_uvs.own = model.corner_positions;
-    model.corner_uvs.kind = IndexPlane::Kind::kOwn;
-  }
-  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> placed;  // by material and uv
-  RunCursor materials(model.material_runs);
-  for (std::size_t f = 0; f < model.face_count(); ++f) {
-    const std::uint32_t number = materials.at(f);
-    const MapPlace& place = model.materials[number].place;
-    if (place == MapPlace()) continue;
-    const std::size_t first = model.face_first(f);
-    for (std::size_t c = first; c < first + model.face_size(f); ++c) {
-      std::uint32_t& uv = model.corner_uvs.own[c];
-      if (uv == kNoIndex) continue;
-      const auto [found, added] = placed.try_emplace({number, uv}, 0);
-      if (added) {
-        found->second = static_cast<std::uint32_t>(model.uvs.size());
-        model.uvs.push_back(model.uvs[uv] * place.scale + place.offset);
-      }
-      uv = found->second;
-    }
-  }
-}
-
 std::string folder_of(const std::string& path) {
   const std::size_t slash = path.rfind('/');
   return slash == std::string::npos ? std::string(".") : path.substr(0, slash + 1);
@@ -654,6 +632,7 @@ void ObjMaterials::resolve(const ModelFolder& folder, const std::string& label, 
   }
   forget_mean_colours(label, model);
   place_maps(model);
+  place_tiles(folder, label, model);
 }
 
 }  // namespace modar

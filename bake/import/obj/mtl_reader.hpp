@@ -13,8 +13,8 @@ namespace modar {
 
 /// The file of a texture statement of an MTL: options before and after the name are ignored.
 /// statement: all after the keyword. name: the part taken for the name, found or not.
-/// transformed: options disturb the uv (-t) or, without `place`, scale or shift it. place: receives
-/// -s and -o.
+/// transformed: options disturb the uv (-t), scale values (-mm) or, without `place`, scale or shift
+/// it. place: receives -s and -o.
 std::string find_map_file(std::string_view statement, const ModelFolder& folder, std::string& name,
                           bool& transformed, MapPlace* place = nullptr);
 
