@@ -55,6 +55,7 @@ THIRD_PARTIES = {
     "jpeglib.h": (r"bake/image/jpeg\.cpp",),
     "jerror.h": (r"bake/image/jpeg\.cpp",),
     "webp/": (r"bake/image/webp\.cpp",),
+    "lcms2.h": (r"bake/image/colour_profile\.cpp",),
     "tiffio.h": (r"bake/image/tiff\.cpp",),
     "stb/": (r"bake/image/stb\.cpp",),
     "Eigen/": (r"(runtime|bake)/.*\.cpp", r"tests/.*"),

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "bake/image/image.hpp"
 #include "bake/image/resample.hpp"
@@ -22,9 +24,23 @@ struct ExifFacts {
   unsigned height = 0;
 };
 
+/// What a file says of its colours; nothing: they are sRGB.
+struct StatedColours {
+  std::vector<std::byte> profile;  ///< ICC, before the others
+  double gamma = 0;                ///< a PNG's gAMA; 0: not stated
+  bool has_primaries = false;
+  /// x and y of white, red, green and blue, by a PNG's cHRM, or those of sRGB.
+  std::array<double, 8> primaries{0.3127, 0.3290, 0.64, 0.33, 0.30, 0.60, 0.15, 0.06};
+};
+
+/// Converts pixels; answers whether any colour may have changed: not where the file means sRGB, and
+/// not by profiles that cannot be read or are of other kinds of colours.
+bool convert_to_srgb(const StatedColours& stated, RgbaImage& image);
+
 /// An image as its file stores it.
 struct StoredImage {
   RgbaImage image;
+  StatedColours colours;
   ExifFacts exif;
 };
 

@@ -24,6 +24,9 @@ enum class Wrap : std::uint8_t { kClamp, kRepeat, kMirror };
 /// Whether the alpha of every pixel is 255.
 bool is_opaque(const RgbaImage& image);
 
+/// kStored: unchanged, whatever the file states, as glTF prescribes and maps of data need.
+enum class Colours : std::uint8_t { kSrgb, kStored };
+
 /// Larger images are refused before they are decoded. Pixels a side.
 inline constexpr std::uint32_t kMaxImageSide = 16384;
 /// Pixels that a file of any size may have: 256 MiB of RGBA.
@@ -34,13 +37,17 @@ inline constexpr std::uint64_t kMaxPixelsPerByte = 64;
 
 /// Reads PNG (libpng), JPEG (libjpeg-turbo), WebP (libwebp), TIFF (libtiff), BMP and TGA
 /// (stb_image) as upright 8-bit RGBA: EXIF orientation is applied; gray, palette, CMYK and 16-bit
-/// images are converted; colour profiles are ignored. The size that a header states is checked
-/// before anything is allocated; a truncated or damaged file is an error, never a partial image.
+/// images are converted, as are the colours of ICC profiles (RGB and gray) and of a PNG's gAMA and
+/// cHRM. The size that a header states is checked before anything is allocated; a truncated or
+/// damaged file is an error, never a partial image.
 /// Errors: kIo "io.open"; kInvalidInput "image.decode", "image.too-large"; kUnsupported
 /// "image.ktx", "image.format", both with the command that converts the file.
-Result<RgbaImage> read_image(const std::string& path);
+Result<RgbaImage> read_image(const std::string& path, Colours colours = Colours::kSrgb);
 /// The same from a file's bytes; `name` is what errors call it.
-Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name);
+Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name,
+                               Colours colours = Colours::kSrgb);
+/// Whether read_image() gives other pixels than the file stores, as it states other colours.
+bool states_other_colours(const std::string& path);
 
 /// Whether a file's name ends as those of the formats do that read_image() reads, in either case.
 bool is_picture_file(const std::string& path);

@@ -61,6 +61,9 @@ std::string with_names(std::string command, const std::string& name) {
   return command;
 }
 
+/// Bytes of a file in which those that state its colours begin. Camera data come before them.
+constexpr std::size_t kMaxProfileAt = 1 << 20;
+
 Result<StoredImage> decode_stored(std::span<const std::byte> bytes, const std::string& name) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   MODAR_TRY(require_kind(FileKind::kPicture, text, name));
@@ -210,19 +213,31 @@ bool is_foreign_picture_file(const std::string& path) {
   return ends_as(path, {".heic", ".heif", ".avif", ".gif", ".pdf", ".svg", ".psd"});
 }
 
-Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name) {
+Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name,
+                               Colours colours) {
   MODAR_ASSIGN(StoredImage stored, decode_stored(bytes, name));
+  if (colours == Colours::kSrgb) convert_to_srgb(stored.colours, stored.image);
   return upright(std::move(stored));
 }
 
-Result<RgbaImage> read_image(const std::string& path) {
+Result<RgbaImage> read_image(const std::string& path, Colours colours) {
   MODAR_ASSIGN(const std::string file, read_file(path, kMaxFileBytes));
-  return decode_image(std::as_bytes(std::span(file)), path);
+  return decode_image(std::as_bytes(std::span(file)), path, colours);
+}
+
+bool states_other_colours(const std::string& path) {
+  const auto file = read_file(path, kMaxFileBytes);
+  constexpr std::array kSigns = {"iCCP"sv, "gAMA"sv, "cHRM"sv, "ICC_PROFILE"sv, "ICCP"sv};
+  const auto is_there = [&](std::string_view sign) { return file->find(sign) < kMaxProfileAt; };
+  if (!file || std::ranges::none_of(kSigns, is_there)) return false;
+  auto stored = decode_stored(std::as_bytes(std::span(*file)), path);
+  return stored && convert_to_srgb(stored->colours, stored->image);
 }
 
 Result<Photo> read_photo(const std::string& path) {
   MODAR_ASSIGN(const std::string file, read_file(path, kMaxFileBytes));
   MODAR_ASSIGN(StoredImage stored, decode_stored(std::as_bytes(std::span(file)), path));
+  convert_to_srgb(stored.colours, stored.image);
   const double focal = focal_px(stored);
   return Photo{upright(std::move(stored)), focal};
 }

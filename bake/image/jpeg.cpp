@@ -51,7 +51,10 @@ class JpegReader {
     errors_.manager.error_exit = give_up;
     errors_.manager.emit_message = on_message;
   }
-  ~JpegReader() { jpeg_destroy_decompress(&info_); }
+  ~JpegReader() {
+    jpeg_destroy_decompress(&info_);
+    std::free(profile_);
+  }
   JpegReader(const JpegReader&) = delete;
   JpegReader& operator=(const JpegReader&) = delete;
 
@@ -63,10 +66,21 @@ class JpegReader {
     if (setjmp(errors_.escape) != 0) return false;
     jpeg_create_decompress(&info_);
     jpeg_save_markers(&info_, JPEG_APP0 + 1, 0xFFFF);
+    jpeg_save_markers(&info_, JPEG_APP0 + 2, 0xFFFF);
     jpeg_mem_src(&info_, reinterpret_cast<const unsigned char*>(bytes_.data()),
                  static_cast<unsigned long>(bytes_.size()));
     jpeg_read_header(&info_, TRUE);
     return true;
+  }
+
+  /// The ICC profile; nothing: none, or a part is missing.
+  std::vector<std::byte> profile() {
+    std::vector<std::byte> bytes;
+    if (read_profile()) {
+      const auto* first = reinterpret_cast<const std::byte*>(profile_);
+      bytes.assign(first, first + profile_size_);
+    }
+    return bytes;
   }
 
   /// Rows of width() * 4 bytes: RGBA, or CMYK where is_cmyk(). Reads up to the end marker.
@@ -102,6 +116,11 @@ class JpegReader {
   }
 
  private:
+  bool read_profile() {
+    if (setjmp(errors_.escape) != 0) return false;
+    return jpeg_read_icc_profile(&info_, &profile_, &profile_size_) != FALSE;
+  }
+
   /// Whether nothing but the end marker can be missing: where the data of a scan end early, libjpeg
   /// warns of that, but not where a whole scan is missing.
   [[nodiscard]] bool has_all_scans() const {
@@ -117,6 +136,8 @@ class JpegReader {
   std::span<const std::byte> bytes_;
   ErrorManager errors_{};
   jpeg_decompress_struct info_{};
+  JOCTET* profile_ = nullptr;  // libjpeg's, by malloc()
+  unsigned profile_size_ = 0;
 };
 
 class JpegWriter {
@@ -191,6 +212,7 @@ Result<StoredImage> decode_jpeg(std::span<const std::byte> bytes, const std::str
   MODAR_TRY(check_image_size(reader.width(), reader.height(), bytes.size(), name));
   StoredImage stored;
   stored.exif = reader.exif();
+  if (!reader.is_cmyk()) stored.colours.profile = reader.profile();
   allocate_pixels(stored.image, reader.width(), reader.height());
   if (!reader.read_pixels(stored.image.pixels.data())) return damaged();
   if (reader.is_cmyk()) cmyk_to_rgba(stored.image.pixels);

@@ -75,9 +75,6 @@ class PngReader {
     if (info_ == nullptr || setjmp(png_jmpbuf(png_)) != 0) return false;
     // Sizes are checked by check_image_size().
     png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
-    // Colour profiles are not used: neither unpacked nor judged.
-    png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER,
-                                reinterpret_cast<png_const_bytep>("iCCP"), 1);
     png_set_read_fn(png_, &state_, on_read);
     png_read_info(png_, info_);
     return true;
@@ -113,6 +110,24 @@ class PngReader {
     png_uint_32 size = 0;
     if (png_get_eXIf_1(png_, info_, &size, &exif) == 0) return {};
     return exif_facts(std::as_bytes(std::span(exif, size)));
+  }
+  /// Valid after read_header().
+  [[nodiscard]] StatedColours colours() const {
+    StatedColours stated;
+    png_charp name = nullptr;
+    int compression = 0;
+    png_bytep profile = nullptr;
+    png_uint_32 size = 0;
+    int intent = 0;
+    if (png_get_iCCP(png_, info_, &name, &compression, &profile, &size) != 0) {
+      const auto bytes = std::as_bytes(std::span(profile, size));
+      stated.profile.assign(bytes.begin(), bytes.end());
+    } else if (png_get_sRGB(png_, info_, &intent) == 0) {
+      png_get_gAMA(png_, info_, &stated.gamma);
+      auto& [wx, wy, rx, ry, gx, gy, bx, by] = stated.primaries;
+      stated.has_primaries = png_get_cHRM(png_, info_, &wx, &wy, &rx, &ry, &gx, &gy, &bx, &by) != 0;
+    }
+    return stated;
   }
   /// Of the picture's width; 0: not stated, or by a program's default.
   [[nodiscard]] double width_mm() const {
@@ -182,6 +197,7 @@ Result<StoredImage> decode_png(std::span<const std::byte> bytes, const std::stri
   }
   if (!reader.read_pixels(rows)) return damaged();
   stored.exif = reader.exif();
+  stored.colours = reader.colours();
   return stored;
 }
 

@@ -101,6 +101,11 @@ Result<StoredImage> decode_tiff(std::span<const std::byte> bytes, const std::str
   std::vector<std::uint32_t> raster(std::size_t{width} * height);
   const bool read = TIFFReadRGBAImageOriented(file.get(), width, height, raster.data(),
                                               ORIENTATION_TOPLEFT, 1) != 0;
+  std::uint32_t profile_size = 0;
+  const std::byte* profile = nullptr;
+  if (TIFFGetField(file.get(), TIFFTAG_ICCPROFILE, &profile_size, &profile) != 0) {
+    stored.colours.profile.assign(profile, profile + profile_size);
+  }
   // libtiff continues after some kinds of damage without reporting it in its result.
   if (!read || !state.error.empty()) return damaged();
   allocate_pixels(stored.image, width, height);

@@ -13,14 +13,16 @@
 namespace modar {
 namespace {
 
-ExifFacts exif_of(const WebPData& data) {
+/// The bytes of a chunk; empty where it is missing.
+std::vector<std::byte> chunk_of(const WebPData& data, const char* kind) {
   const std::unique_ptr<WebPDemuxer, void (*)(WebPDemuxer*)> demuxer(WebPDemux(&data),
                                                                      &WebPDemuxDelete);
   WebPChunkIterator chunk{};
-  if (!demuxer || WebPDemuxGetChunk(demuxer.get(), "EXIF", 1, &chunk) == 0) return {};
-  const ExifFacts facts = exif_facts(std::as_bytes(std::span(chunk.chunk.bytes, chunk.chunk.size)));
+  if (!demuxer || WebPDemuxGetChunk(demuxer.get(), kind, 1, &chunk) == 0) return {};
+  const auto bytes = std::as_bytes(std::span(chunk.chunk.bytes, chunk.chunk.size));
+  std::vector<std::byte> copy(bytes.begin(), bytes.end());
   WebPDemuxReleaseChunkIterator(&chunk);
-  return facts;
+  return copy;
 }
 
 /// libwebp's quality of previews: lower blurs more, higher leaves fewer pixels in the same bytes.
@@ -88,7 +90,8 @@ Result<StoredImage> decode_webp(std::span<const std::byte> bytes, const std::str
                          stored.image.pixels.size(), features.width * 4) == nullptr) {
     return damaged_image(name, "the WebP data is damaged or cut short");
   }
-  stored.exif = exif_of(data);
+  stored.exif = exif_facts(chunk_of(data, "EXIF"));
+  stored.colours.profile = chunk_of(data, "ICCP");
   return stored;
 }
 

@@ -425,6 +425,115 @@ TEST(PngEncoder, WritesAlphaWhereThereIsSome) {
   EXPECT_FALSE(encode_png(RgbaImage{}));
 }
 
+/// A PNG of one colour with chunks behind its header.
+Bytes with_chunks(const cv::Scalar& bgr, std::initializer_list<unsigned> chunks) {
+  Bytes bytes = encoded(cv::Mat(2, 2, CV_8UC3, bgr), ".png");
+  const Bytes added = Bytes{} + chunks;
+  bytes.insert(bytes.begin() + 33, added.begin(), added.end());
+  return bytes;
+}
+
+std::array<int, 3> first_pixel(const Bytes& bytes, Colours colours = Colours::kSrgb) {
+  const auto image = decode_image(bytes, "picture", colours);
+  if (!image) return {-1, -1, -1};
+  return {image->pixels[0], image->pixels[1], image->pixels[2]};
+}
+
+void expect_near(const std::array<int, 3>& seen, const std::array<int, 3>& wanted) {
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(seen[i], wanted[i], 2) << i;
+}
+
+// sRGB of linear light (IEC 61966-2-1): 128 / 255 is 188.0, 64 / 255 is 137.2. W3C's test
+// color-valid-display-p3: (0.26374, 0.59085, 0.16434) is #009900.
+TEST(ImageReader, APngsGammaAndPrimariesBecomeSrgb) {
+  const Bytes linear = with_chunks({0, 64, 128}, {0, 0, 0, 4, 'g', 'A', 'M', 'A', 0x00, 0x01, 0x86,
+                                                  0xA0, 0x31, 0xE8, 0x96, 0x5F});
+  expect_near(first_pixel(linear), {188, 137, 0});
+  expect_near(first_pixel(linear, Colours::kStored), {128, 64, 0});
+  const Bytes usual = with_chunks({0, 64, 128}, {0, 0, 0, 4, 'g', 'A', 'M', 'A', 0x00, 0x00, 0xB1,
+                                                 0x8F, 0x0B, 0xFC, 0x61, 0x05});
+  EXPECT_EQ(first_pixel(usual), (std::array{128, 64, 0}));
+  const Bytes wide = with_chunks(
+      {42, 151, 67},
+      {0,    0,    0,    32,   'c',  'H',  'R',  'M',  0x00, 0x00, 0x7A, 0x26, 0x00, 0x00, 0x80,
+       0x84, 0x00, 0x01, 0x09, 0xA0, 0x00, 0x00, 0x7D, 0x00, 0x00, 0x00, 0x67, 0x84, 0x00, 0x01,
+       0x0D, 0x88, 0x00, 0x00, 0x3A, 0x98, 0x00, 0x00, 0x17, 0x70, 0xF1, 0xF8, 0xCA, 0x57});
+  expect_near(first_pixel(wide), {0, 153, 0});
+}
+
+/// An ICC profile (ICC.1:2010): tags of XYZ numbers, s15Fixed16, and of one curve for all.
+Bytes icc_profile(const char* space,
+                  const std::vector<std::pair<const char*, std::array<double, 3>>>& xyz,
+                  const std::vector<const char*>& curve_tags, const std::vector<double>& curve) {
+  std::string data;
+  const auto put = [](std::string& to, std::uint32_t value) {
+    for (int shift = 24; shift >= 0; shift -= 8) to += static_cast<char>(value >> shift & 255);
+  };
+  const auto fixed = [&](std::string& to, double value) {
+    put(to, static_cast<std::uint32_t>(std::lround(value * 65536)));
+  };
+  const std::size_t tags = xyz.size() + curve_tags.size();
+  const std::size_t start = 132 + 12 * tags;
+  std::string table;
+  const auto tag = [&](const char* name, std::size_t at, std::size_t size) {
+    table += name;
+    put(table, static_cast<std::uint32_t>(start + at));
+    put(table, static_cast<std::uint32_t>(size));
+  };
+  for (const auto& [name, values] : xyz) {
+    tag(name, data.size(), 20);
+    data += std::string("XYZ \0\0\0\0", 8);
+    for (const double value : values) fixed(data, value);
+  }
+  for (const char* name : curve_tags) tag(name, data.size(), 12 + 4 * curve.size());
+  data +=
+      std::string("para\0\0\0\0\0", 9) + (curve.size() == 1 ? '\0' : '\3') + std::string(2, '\0');
+  for (const double value : curve) fixed(data, value);
+  std::string header;
+  put(header, static_cast<std::uint32_t>(start + data.size()));
+  header += std::string(4, '\0') + std::string("\4\0\0\0", 4) + "mntr" + space + "XYZ ";
+  header += std::string(12, '\0') + "acsp" + std::string(28, '\0');
+  for (const double value : {0.9642, 1.0, 0.8249}) fixed(header, value);
+  header += std::string(48, '\0');
+  put(header, static_cast<std::uint32_t>(tags));
+  const std::string all = header + table + data;
+  return to_bytes({all.begin(), all.end()});
+}
+
+/// A JPEG with a profile in its APP2.
+Bytes with_profile(const cv::Mat& picture, const Bytes& profile) {
+  Bytes bytes = encoded(picture, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 100});
+  const auto size = static_cast<unsigned>(profile.size() + 16);
+  Bytes segment = Bytes{} + std::initializer_list<unsigned>{0xFF, 0xE2, size >> 8, size & 255};
+  for (const char c : std::string_view("ICC_PROFILE\0\1\1", 14)) {
+    segment.push_back(static_cast<std::byte>(c));
+  }
+  segment.insert(segment.end(), profile.begin(), profile.end());
+  bytes.insert(bytes.begin() + 2, segment.begin(), segment.end());
+  return bytes;
+}
+
+// Display P3 by its registered colorants, adapted to D50.
+TEST(ImageReader, ColoursOfProfilesBecomeSrgb) {
+  const std::vector<double> srgb = {2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045};
+  const Bytes p3 = icc_profile("RGB ",
+                               {{"wtpt", {0.9642, 1, 0.8249}},
+                                {"rXYZ", {0.51512, 0.2412, -0.00105}},
+                                {"gXYZ", {0.29198, 0.69225, 0.04189}},
+                                {"bXYZ", {0.1571, 0.06657, 0.78407}}},
+                               {"rTRC", "gTRC", "bTRC"}, srgb);
+  const Bytes wide = with_profile(cv::Mat(8, 8, CV_8UC3, cv::Scalar(42, 151, 67)), p3);
+  expect_near(first_pixel(wide), {0, 153, 0});
+  expect_near(first_pixel(wide, Colours::kStored), {67, 151, 42});
+  const Bytes gray = icc_profile("GRAY", {{"wtpt", {0.9642, 1, 0.8249}}}, {"kTRC"}, {1.0});
+  const Bytes linear = with_profile(cv::Mat(8, 8, CV_8UC1, cv::Scalar(64)), gray);
+  expect_near(first_pixel(linear), {137, 137, 137});
+  // A profile of gray for colours, and one that is cut short, are not used.
+  const cv::Mat colours(8, 8, CV_8UC3, cv::Scalar(42, 151, 67));
+  expect_near(first_pixel(with_profile(colours, gray)), {67, 151, 42});
+  expect_near(first_pixel(with_profile(colours, {p3.begin(), p3.begin() + 150})), {67, 151, 42});
+}
+
 // As photo shops leave them: libpng would write to stderr, and it is not our words.
 TEST(ImageReader, APngsColourProfileIsPassedOverInSilence) {
   const cv::Mat picture(5, 7, CV_8UC3, cv::Scalar(10, 20, 30));

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@
 #include <glm/geometric.hpp>
 
 #include "bake/image/image.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "tests/import/samples.hpp"
 #include "tests/mesh/stages.hpp"
 
@@ -430,6 +432,31 @@ TEST_F(Gltf, PicturesAndModesOfAlphaAreFoldedIntoTheColour) {
   EXPECT_EQ(ids,
             (std::vector<std::string>{"gltf.alpha-mask", "gltf.emissive-map", "gltf.emissive-map",
                                       "gltf.metal-map", "gltf.occlusion-map"}));
+}
+
+// glTF 2.0, 3.8.2: colour space information of image files is ignored.
+TEST_F(Gltf, WhatPicturesStateOfTheirColoursIsIgnored) {
+  auto png = encode_png(RgbaImage{1, 1, {128, 64, 0, 255}});
+  ASSERT_TRUE(png);
+  const auto gamma = {0,    0,    0,    4,    0x67, 0x41, 0x4D, 0x41,   // gAMA of 1, its checksum
+                      0x00, 0x01, 0x86, 0xA0, 0x31, 0xE8, 0x96, 0x5F};  // behind the header
+  std::vector<std::byte> bytes;
+  for (const int value : gamma) bytes.push_back(static_cast<std::byte>(value));
+  png->insert(png->begin() + 33, bytes.begin(), bytes.end());
+  const std::string path = (folder_ / "linear.png").string();
+  ASSERT_TRUE(write_file(path, std::span<const std::byte>(*png)));
+  EXPECT_NEAR(read_image(path)->pixels[0], 188, 1) << "as other formats show it";
+  const auto model = read(
+      std::string(kOneTriangle) +
+          R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],
+          "images":[{"uri":"linear.png"}],"textures":[{"source":0}],
+          "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],
+          "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])",
+      one_triangle());
+  ASSERT_TRUE(model) << to_line(model.error());
+  const auto image = read_image(model->materials[0].diffuse_map);
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->pixels, (std::vector<std::uint8_t>{128, 64, 0, 255}));
 }
 
 TEST_F(Gltf, SparseAccessorsReplaceWhatTheyList) {

@@ -386,7 +386,7 @@ class MaterialReader {
     const int source = source_of(gltf_.textures[static_cast<std::size_t>(texture)]);
     if (source < 0 || static_cast<std::size_t>(source) >= gltf_.images.size()) return {};
     const auto index = static_cast<std::size_t>(source);
-    if (!paths_[index]) paths_[index] = find_image(gltf_.images[index], index);
+    if (!paths_[index]) paths_[index] = as_stored(find_image(gltf_.images[index], index));
     return *paths_[index];
   }
 
@@ -410,6 +410,15 @@ class MaterialReader {
       if (source.IsInt()) return source.GetNumberAsInt();
     }
     return -1;
+  }
+
+  /// glTF 2.0, 3.8.2: what files state of their colours is ignored. A path of the stored pixels.
+  std::string as_stored(const std::string& path) {
+    if (path.empty() || !states_other_colours(path)) return path;
+    const auto image = read_image(path, Colours::kStored);
+    if (!image) return path;
+    const std::string copy = new_picture(std::filesystem::path(path).stem().string() + ".png");
+    return write_png(*image, copy) ? copy : path;
   }
 
   std::string find_image(const tinygltf::Image& image, std::size_t index) {

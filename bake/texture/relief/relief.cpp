@@ -412,7 +412,7 @@ RgbaImage normals_of_heights(const RgbaImage& heights) {
 }
 
 Result<RgbaImage> read_normals(const NormalMap& normal) {
-  MODAR_ASSIGN(RgbaImage map, read_image(normal.path));
+  MODAR_ASSIGN(RgbaImage map, read_image(normal.path, Colours::kStored));
   if (normal.may_be_heights && holds_heights(map)) return normals_of_heights(map);
   return map;
 }

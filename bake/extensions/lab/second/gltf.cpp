@@ -204,10 +204,11 @@ class GltfReader {
     }
     std::size_t stride = 0;
     const int view = index(image, "bufferView");
-    if (view < 0) return decode_picture(uri_bytes(text(image, "uri")), material.picture);
+    if (view < 0)
+      return decode_picture(uri_bytes(text(image, "uri")), material.picture, Colours::kStored);
     const double length = number(views_.at(static_cast<std::size_t>(view)), "byteLength", 0);
     const std::string_view bytes = view_bytes(view, 0, static_cast<std::size_t>(length), stride);
-    return decode_picture(bytes, material.picture);
+    return decode_picture(bytes, material.picture, Colours::kStored);
   }
 
   void take_material(const Json& json) {

@@ -215,9 +215,9 @@ std::string named_file(const std::string& from, std::string name) {
   return {};
 }
 
-bool decode_picture(std::string_view bytes, RgbaImage& picture) {
+bool decode_picture(std::string_view bytes, RgbaImage& picture, Colours colours) {
   if (bytes.empty()) return false;
-  Result<RgbaImage> decoded = decode_image(std::as_bytes(std::span(bytes)), "picture");
+  Result<RgbaImage> decoded = decode_image(std::as_bytes(std::span(bytes)), "picture", colours);
   if (decoded) picture = std::move(*decoded);
   return decoded.has_value();
 }

@@ -53,6 +53,6 @@ bool take_line(std::string_view& text, std::string& line);
 /// Path of a file named in another one, or empty.
 std::string named_file(const std::string& from, std::string name);
 /// False where the bytes are no picture.
-bool decode_picture(std::string_view bytes, RgbaImage& picture);
+bool decode_picture(std::string_view bytes, RgbaImage& picture, Colours colours = Colours::kSrgb);
 
 }  // namespace modar::second
