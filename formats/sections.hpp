@@ -115,10 +115,26 @@ constexpr float material_share(std::uint32_t flags, MaterialFlags which) {
 }
 
 enum TextureFlags : std::uint32_t {
-  kTextureAlpha = 1,   ///< each level has a second ETC1 image whose luminance is alpha
-  kTextureRepeat = 2,  ///< uv leave [0,1]: wrap GL_REPEAT (sides are powers of two), else clamp
-  kTextureCutOut = 4,  ///< with kTextureAlpha: something where alpha is 1/2 and more, else nothing
+  kTextureAlpha = 1,    ///< each level has a second ETC1 image whose luminance is alpha
+  kTextureRepeat = 2,   ///< uv leave [0,1]: wrap GL_REPEAT (sides are powers of two), else clamp
+  kTextureCutOut = 4,   ///< with kTextureAlpha: something where alpha is 1/2 and more, else nothing
+  kTextureMirrorU = 8,  ///< these with kTextureRepeat, at most one an axis: its way beyond [0,1]
+  kTextureMirrorV = 16,
+  kTextureClampU = 32,
+  kTextureClampV = 64,
 };
+
+/// What a texture shows outside of [0,1].
+enum class Wrap : std::uint8_t { kClamp, kRepeat, kMirror };
+
+/// What flags of a texture say of u and v.
+constexpr std::array<Wrap, 2> texture_wrap(std::uint32_t flags) {
+  const auto along = [flags](std::uint32_t mirror, std::uint32_t clamp) {
+    if ((flags & kTextureRepeat) == 0 || (flags & clamp) != 0) return Wrap::kClamp;
+    return (flags & mirror) != 0 ? Wrap::kMirror : Wrap::kRepeat;
+  };
+  return {along(kTextureMirrorU, kTextureClampU), along(kTextureMirrorV, kTextureClampV)};
+}
 
 enum NodeFlags : std::uint32_t {
   kNodeHidden = 1,  ///< until an action shows it
@@ -148,6 +164,10 @@ inline constexpr FlagInfo kFlags[] = {
     {"TextureRecord", kTextureAlpha, 0},
     {"TextureRecord", kTextureRepeat, 0},
     {"TextureRecord", kTextureCutOut, 2},
+    {"TextureRecord", kTextureMirrorU, 3},
+    {"TextureRecord", kTextureMirrorV, 3},
+    {"TextureRecord", kTextureClampU, 3},
+    {"TextureRecord", kTextureClampV, 3},
     {"NodeRecord", kNodeHidden, 0},
     {"NodeRecord", kNodePlays, 0},
     {"NodeRecord", kNodeLoops, 0},

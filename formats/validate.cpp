@@ -645,6 +645,14 @@ void check_texture(const RecordCheck& check, const TextureRecord& texture) {
   if ((texture.flags & (kTextureAlpha | kTextureCutOut)) == kTextureCutOut) {
     check.fault(Rule::kTextureRange, &texture.flags, "it is cut out, and has no alpha");
   }
+  constexpr std::uint32_t kAlongU = kTextureMirrorU | kTextureClampU;
+  constexpr std::uint32_t kAlongV = kTextureMirrorV | kTextureClampV;
+  const bool repeats = (texture.flags & kTextureRepeat) != 0;
+  if ((texture.flags & kAlongU) == kAlongU || (texture.flags & kAlongV) == kAlongV ||
+      (!repeats && (texture.flags & (kAlongU | kAlongV)) != 0)) {
+    check.fault(Rule::kTextureRange, &texture.flags,
+                "it is mirrored or clamped, and does not repeat, or both along one axis");
+  }
   check.reserved(texture.reserved, sizeof(texture.reserved));
   if (find_texture_format(texture.format) == nullptr) {
     check.fault(Rule::kEnum, &texture.format,

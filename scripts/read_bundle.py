@@ -30,8 +30,10 @@ def check_textures(bundle):
            "BUNDLE_TEXTURE_RANGE")
     for number, row in enumerate(tables["textures"]):
         width, height, at = row["width"], row["height"], row["at"]
-        flags_known(bundle, row, 7)
+        flags_known(bundle, row, 127)
         need(row["flags"] & 5 != 4, "BUNDLE_TEXTURE_RANGE", at, "cut out without alpha")
+        ways = row["flags"] >> 3 & 15
+        need(not ways & ways >> 2 and (not ways or row["flags"] & 2), "BUNDLE_TEXTURE_RANGE", at, "beyond [0,1]")
         need(row["format"] == 1, "BUNDLE_ENUM", at, "format")
         need(-1 <= row["ssim"] <= 1 and 0 <= row["psnr_db"] <= 140, "BUNDLE_NUMBER", at, "quality")
         need(1 <= min(width, height) and max(width, height) <= 8192 and

@@ -88,9 +88,11 @@ void GlbBuilder::add_images(const ModelRecord& model, std::span<const GlbImage> 
     image.name = std::string(bundle_.name(record.name));
     gltf_.images.push_back(image);
     tinygltf::Sampler sampler;
-    const bool repeats = (record.flags & kTextureRepeat) != 0;
-    sampler.wrapS = repeats ? TINYGLTF_TEXTURE_WRAP_REPEAT : TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE;
-    sampler.wrapT = sampler.wrapS;
+    constexpr int kModes[] = {TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE, TINYGLTF_TEXTURE_WRAP_REPEAT,
+                              TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT};  // of Wrap
+    const std::array<Wrap, 2> wrap = texture_wrap(record.flags);
+    sampler.wrapS = kModes[static_cast<std::size_t>(wrap[0])];
+    sampler.wrapT = kModes[static_cast<std::size_t>(wrap[1])];
     gltf_.samplers.push_back(sampler);
     tinygltf::Texture texture;
     texture.source = static_cast<int>(gltf_.images.size() - 1);

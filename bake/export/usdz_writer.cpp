@@ -191,7 +191,10 @@ Result<void> Description::add_material(std::uint32_t index, bool coloured) {
   std::string others;
   if (!file.empty()) {
     const TextureRecord& texture = bundle_.textures()[source.texture];
-    const char* wrap = (texture.flags & kTextureRepeat) != 0 ? "repeat" : "clamp";
+    constexpr const char* kWays[] = {"clamp", "repeat", "mirror"};  // of Wrap
+    const auto wrap = [&](std::size_t axis) {
+      return kWays[static_cast<std::size_t>(texture_wrap(texture.flags)[axis])];
+    };
     if ((texture.flags & kTextureAlpha) != 0) {
       opacity = "float inputs:opacity.connect = <" + path + "/Colour.outputs:a>";
     }
@@ -207,8 +210,8 @@ Result<void> Description::add_material(std::uint32_t index, bool coloured) {
                         line("float4 inputs:scale = " +
                              tuple(glm::dvec4(diffuse, static_cast<double>(source.opacity)))) +
                         line("token inputs:sourceColorSpace = \"sRGB\"") +
-                        line(std::string("token inputs:wrapS = \"") + wrap + "\"") +
-                        line(std::string("token inputs:wrapT = \"") + wrap + "\"") +
+                        line(std::string("token inputs:wrapS = \"") + wrap(0) + "\"") +
+                        line(std::string("token inputs:wrapT = \"") + wrap(1) + "\"") +
                         line("float3 outputs:rgb") + line("float outputs:a"));
   } else if (coloured) {
     surface += line("color3f inputs:diffuseColor.connect = <" + path + "/Colour.outputs:result>");

@@ -18,9 +18,6 @@ struct RgbaImage {
   std::vector<std::uint8_t> pixels;  ///< width * height * 4
 };
 
-/// What a texture shows outside of [0,1].
-enum class Wrap : std::uint8_t { kClamp, kRepeat, kMirror };
-
 /// Whether the alpha of every pixel is 255.
 bool is_opaque(const RgbaImage& image);
 

@@ -13,6 +13,7 @@
 #include "bake/memory/array.hpp"
 #include "bake/report.hpp"
 #include "bake/up_axis.hpp"
+#include "formats/sections.hpp"
 
 namespace modar {
 
@@ -52,6 +53,7 @@ struct SourceMaterial {
   float metalness = 0.0f;    ///< 1: mirrors its colour's part, and scatters nothing
   float opacity = 1.0f;
   std::string diffuse_map;
+  std::uint32_t beyond = kTextureRepeat;  ///< its TextureFlags where uvs leave [0,1]
   std::string alpha_map;
   MapPlace place;  ///< of the diffuse map; readers apply it to the uvs
   NormalMap normal;

@@ -63,15 +63,17 @@ inline tl::unexpected<Error> no_triangle_left(const std::string& model, const ch
 /// sliver; smaller repeats those with rounding errors.
 inline constexpr double kUvSlack = 1e-4;
 
-/// For each material, whether any of its triangles samples outside of [0,1].
-inline std::vector<bool> repeating_materials(const TriMesh& mesh) {
-  std::vector<bool> repeats(mesh.materials.size(), false);
+/// For each material SourceMaterial::beyond, 0 where none of its triangles samples outside of
+/// [0,1].
+inline std::vector<std::uint32_t> repeating_materials(const TriMesh& mesh) {
+  std::vector<std::uint32_t> repeats(mesh.materials.size(), 0);
   if (mesh.uvs.empty()) return repeats;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     for (const std::uint32_t v : mesh.triangles[t]) {
       const glm::dvec2& uv = mesh.uvs[v];
       if (uv.x < -kUvSlack || uv.y < -kUvSlack || uv.x > 1 + kUvSlack || uv.y > 1 + kUvSlack) {
-        repeats[mesh.triangle_material[t]] = true;
+        const std::uint32_t material = mesh.triangle_material[t];
+        repeats[material] = mesh.materials[material].beyond;
       }
     }
   }

@@ -27,7 +27,7 @@ std::uint64_t pixel_count(const RgbaImage& image) {
 RgbaImage resized(const RgbaImage& image, const TextureOptions& options) {
   const TextureSize size = texture_size({image.width, image.height}, options);
   if (size.width == image.width && size.height == image.height) return image;
-  return resize(image, size.width, size.height, {options.repeat, options.jobs});
+  return resize(image, size.width, size.height, {filters_across(options.wrap), options.jobs});
 }
 
 /// Whether all texels that are shown look the same.
@@ -117,8 +117,9 @@ std::vector<RgbaImage> make_levels(const RgbaImage& source, const TextureOptions
     top = {1, 1, {texture.constant_rgba.begin(), texture.constant_rgba.end()}};
     return {top};
   }
-  std::vector<RgbaImage> levels = options.mipmaps ? mip_chain(top, options.repeat, options.jobs)
-                                                  : std::vector<RgbaImage>{std::move(top)};
+  std::vector<RgbaImage> levels = options.mipmaps
+                                      ? mip_chain(top, filters_across(options.wrap), options.jobs)
+                                      : std::vector<RgbaImage>{std::move(top)};
   texture.cut_out = texture.alpha && is_cut_out(levels.front());
   if (texture.cut_out) {
     const double share = covered(levels.front(), 1);
@@ -164,7 +165,7 @@ Result<void> write_picture(const RgbaImage& image, const Texture& texture,
 }  // namespace
 
 TextureSize texture_size(TextureSize source, const TextureOptions& options) {
-  if (options.mipmaps || options.repeat) {
+  if (options.mipmaps || options.wrap != 0) {
     return {nearest_power(source.width, options.max_side),
             nearest_power(source.height, options.max_side)};
   }
@@ -198,7 +199,7 @@ Result<Texture> bake_texture(const RgbaImage& source, const std::string& path,
   texture.format = options.format;
   texture.source_width = source.width;
   texture.source_height = source.height;
-  texture.repeat = options.repeat;
+  texture.wrap = options.wrap;
   const std::vector<RgbaImage> images = make_levels(source, options, texture);
   std::uint64_t pixels = 0;
   for (const RgbaImage& image : images) pixels += pixel_count(image);

@@ -10,6 +10,7 @@
 #include "bake/report.hpp"
 #include "bake/texture/texture_codec.hpp"
 #include "formats/base/error.hpp"
+#include "formats/sections.hpp"
 
 namespace modar {
 
@@ -32,7 +33,7 @@ struct Texture {
   TextureFormat format = TextureFormat::kEtc1Rgb;
   std::uint32_t source_width = 0;
   std::uint32_t source_height = 0;
-  bool repeat = false;
+  std::uint32_t wrap = 0;  ///< as in TextureOptions
   bool alpha = false;
   bool cut_out =
       false;  ///< alpha is nearly everywhere 0 or 1: coarser levels keep the covered share
@@ -47,8 +48,10 @@ struct TextureOptions {
   TextureFormat format = TextureFormat::kEtc1Rgb;
   std::uint32_t max_side = 2048;
   bool mipmaps = true;
-  bool repeat = false;  ///< sides become powers of two (ES 2.0 repeats and mips no others)
-  unsigned jobs = 1;    ///< the bytes do not depend on it
+  /// TextureFlags of a texture whose uvs leave [0,1]: kTextureRepeat and how; 0: none do. Sides
+  /// become powers of two (ES 2.0 repeats and mips no others).
+  std::uint32_t wrap = 0;
+  unsigned jobs = 1;  ///< the bytes do not depend on it
   TextureEffort effort = TextureEffort::kGood;
   bool perceptual = false;  ///< see EncodeOptions
   /// Which texels the model shows (bake/texture/coverage.hpp), at any size; nothing: all of them.
@@ -58,6 +61,11 @@ struct TextureOptions {
   double min_ssim = 0;         ///< the same
   std::string picture_folder;  ///< quality_picture() of level 0 goes there as NAME.png; empty: none
 };
+
+/// Whether coarser levels mix opposite edges: only where both axes repeat.
+constexpr bool filters_across(std::uint32_t wrap) {
+  return texture_wrap(wrap) == std::array<Wrap, 2>{Wrap::kRepeat, Wrap::kRepeat};
+}
 
 struct TextureSize {
   std::uint32_t width = 0;

@@ -16,14 +16,16 @@ namespace {
 /// takes four times the time. [512, 2048]
 constexpr std::uint32_t kCoverageSide = 1024;
 
-std::uint32_t use_of(const std::string& path, bool repeat, TextureUses& textures) {
+std::uint32_t use_of(const std::string& path, std::uint32_t wrap, TextureUses& textures) {
   const auto next = static_cast<std::uint32_t>(textures.uses.size());
-  const auto [place, added] = textures.index.try_emplace({path, repeat}, next);
+  const auto [place, added] = textures.index.try_emplace({path, wrap}, next);
   if (added) {
     TextureUse& use = textures.uses.emplace_back();
     use.path = path;
-    use.repeat = repeat;
+    use.wrap = wrap;
     use.coverage = make_coverage(kCoverageSide, kCoverageSide);
+    // Masks repeat, so all texels of other textures count as shown.
+    use.coverage.full = wrap != 0 && !filters_across(wrap);
   }
   return place->second;
 }
@@ -33,7 +35,7 @@ bool same_level(const TextureLevel& a, const TextureLevel& b) {
 }
 
 bool same_pixels(const Texture& a, const Texture& b) {
-  return a.repeat == b.repeat && a.alpha == b.alpha &&
+  return a.wrap == b.wrap && a.alpha == b.alpha &&
          std::equal(a.levels.begin(), a.levels.end(), b.levels.begin(), b.levels.end(), same_level);
 }
 
@@ -45,8 +47,8 @@ TextureOutcome append_texture(const Texture& baked, BundleContent& content) {
   record.source_width = baked.source_width;
   record.source_height = baked.source_height;
   record.format = static_cast<std::uint32_t>(baked.format);
-  record.flags = (baked.alpha ? kTextureAlpha : 0u) | (baked.repeat ? kTextureRepeat : 0u) |
-                 (baked.cut_out ? kTextureCutOut : 0u);
+  record.flags =
+      (baked.alpha ? kTextureAlpha : 0u) | baked.wrap | (baked.cut_out ? kTextureCutOut : 0u);
   record.first_level = static_cast<std::uint32_t>(content.texture_levels.size());
   record.level_count = static_cast<std::uint32_t>(baked.levels.size());
   record.psnr_db = static_cast<float>(baked.levels.front().psnr_db);
@@ -82,7 +84,7 @@ TextureOutcome append_texture(const Texture& baked, BundleContent& content) {
 std::vector<std::uint32_t> collect_textures(const TriMesh& mesh, TextureUses& textures) {
   std::vector<std::uint32_t> uses(mesh.materials.size(), kNone);
   if (mesh.uvs.empty()) return uses;
-  const std::vector<bool> repeats = repeating_materials(mesh);
+  const std::vector<std::uint32_t> repeats = repeating_materials(mesh);
   std::vector<bool> shown(mesh.materials.size(), false);
   for (const std::uint32_t material : mesh.triangle_material) shown[material] = true;
   for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
@@ -219,7 +221,7 @@ Result<std::vector<TextureOutcome>> bake_textures(const TextureUses& textures,
   for (std::size_t i = 0; i < textures.uses.size(); ++i) {
     const TextureUse& use = textures.uses[i];
     if (use.replaced) continue;
-    options.repeat = use.repeat;
+    options.wrap = use.wrap;
     options.coverage = use.coverage.full ? nullptr : &use.coverage;
     options.max_side = use.image ? page_side : file_side;
     MODAR_ASSIGN(Texture texture, bake_use(use, options, report));

@@ -24,7 +24,7 @@ namespace modar {
 /// An image with one wrap mode, and the texels that any triangle of any model shows of it.
 struct TextureUse {
   std::string path;
-  bool repeat = false;
+  std::uint32_t wrap = 0;  ///< as in TextureOptions
   CoverageMask coverage;
   std::uint32_t meshes = 0;                ///< that show it
   std::shared_ptr<const RgbaImage> image;  ///< a page that make_atlases() drew; null: the file
@@ -35,7 +35,7 @@ struct TextureUse {
 /// the same way is one use.
 struct TextureUses {
   std::vector<TextureUse> uses;
-  std::map<std::pair<std::string, bool>, std::uint32_t> index;
+  std::map<std::pair<std::string, std::uint32_t>, std::uint32_t> index;
 };
 
 /// Notes the images that a mesh shows. Answers the use of each material, kNone where it shows none.

@@ -144,9 +144,13 @@ GLuint TextureStore::begin(const TextureRecord& record) {
   // ES 2.0 repeats power-of-two textures only, and shows others black if they should repeat.
   const bool repeat =
       (record.flags & kTextureRepeat) != 0 && (npot_mipmaps_ || power_of_two(record));
-  const GLint wrap = repeat ? GL_REPEAT : GL_CLAMP_TO_EDGE;
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, wrap);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, wrap);
+  const auto set = [repeat](GLenum axis, Wrap wrap) {
+    const GLint beyond = wrap == Wrap::kMirror ? GL_MIRRORED_REPEAT : GL_REPEAT;
+    glTexParameteri(GL_TEXTURE_2D, axis,
+                    repeat && wrap != Wrap::kClamp ? beyond : GL_CLAMP_TO_EDGE);
+  };
+  set(GL_TEXTURE_WRAP_S, texture_wrap(record.flags)[0]);
+  set(GL_TEXTURE_WRAP_T, texture_wrap(record.flags)[1]);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER,
                   mipmapped(record) ? GL_LINEAR_MIPMAP_LINEAR : GL_LINEAR);

@@ -153,6 +153,16 @@ TEST_F(SecondTest, GoodBundlesDifferInNothing) {
   }
 }
 
+TEST_F(SecondTest, PicturesContinueAsSamplersSay) {
+  constexpr const char* kRepeat = R"("wrapS":10497,"wrapT":10497)";
+  for (const char* const modes :
+       {R"("wrapS":33071,"wrapT":33071)", R"("wrapS":33648,"wrapT":33648)",
+        R"("wrapS":33071,"wrapT":33648)", R"("wrapS":10497,"wrapT":33071)"}) {
+    const std::string path = write("sampler.gltf", replaced(kGltf, kRepeat, modes));
+    EXPECT_EQ(issues(path, path), Ids()) << modes << details_;
+  }
+}
+
 TEST_F(SecondTest, GeneratedNormalsWithoutTheirCreases) {
   const std::string path = write("box.obj", kObj);
   EXPECT_EQ(issues(path, path, 180), Ids{"SOURCE_COLOUR"});

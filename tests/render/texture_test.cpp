@@ -307,6 +307,43 @@ TEST_F(TextureTest, CutOutsHideWhatIsDrawnAfterThemWhereTheyAre) {
   EXPECT_NEAR(at(6, 1), 255, 2);
 }
 
+// Sections 3.7.6 and 3.7.7 of the ES 2.0 specification: halves of the picture from -1 to 2.
+TEST_F(TextureTest, PicturesContinueBeyondTheirEdgesAsTheirFlagsSay) {
+  const std::vector<HandMadeBlock> quarters = {flat_block(0, 0, 15), flat_block(15, 0, 15),
+                                               flat_block(0, 15, 15), flat_block(15, 15, 15)};
+  struct {
+    std::uint32_t flags;
+    const char* u;  ///< 0: left or upper half of the picture, 1: the other one
+    const char* v;
+  } const kCases[] = {{0, "000111", "000111"},
+                      {kTextureRepeat, "010101", "010101"},
+                      {kTextureRepeat | kTextureMirrorU, "100110", "010101"},
+                      {kTextureRepeat | kTextureMirrorU | kTextureClampV, "100110", "000111"},
+                      {kTextureRepeat | kTextureMirrorV, "010101", "100110"},
+                      {kTextureRepeat | kTextureClampU | kTextureMirrorV, "000111", "100110"}};
+  for (const auto& wanted : kCases) {
+    SceneMaker maker;
+    add_square(maker, maker.add_texture(8, {pack_all(quarters)}, {}, wanted.flags));
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      maker.content.chunks[0].uv_offset[axis] = -1;
+      maker.content.chunks[0].uv_scale[axis] = 3;
+    }
+    const MappedBundle bundle(maker.content);
+    const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
+    ASSERT_TRUE(renderer);
+    const ExactView view = exact_view(24);
+    const std::vector<std::uint8_t> pixels = draw(*renderer, view.camera, {&view.item, 1});
+    std::string u;
+    std::string v;
+    for (std::size_t i = 0; i < 6; ++i) {
+      u += pixels[(11 * 24 + 4 * i + 2) * 4] > 127 ? '1' : '0';
+      v += pixels[((4 * i + 2) * 24 + 11) * 4 + 1] > 127 ? '1' : '0';
+    }
+    EXPECT_EQ(u, wanted.u) << wanted.flags;
+    EXPECT_EQ(v, wanted.v) << wanted.flags;
+  }
+}
+
 TEST_F(TextureTest, DrawsSortedByTextureBindEachOnce) {
   SceneMaker maker;
   const std::vector<HandMadeBlock> blocks(1, flat_block(9, 9, 9));

@@ -71,7 +71,7 @@ TEST(BakeTexture, LimitsAndKeepsSizes) {
   EXPECT_EQ(scaled.levels.size(), 1U);
   options.max_side = 2048;
   EXPECT_EQ(bake(path, options).levels[0].width, 150U);
-  options.repeat = true;
+  options.wrap = kTextureRepeat;
   EXPECT_EQ(bake(path, options).levels[0].width, 128U);
   Report report;
   options.max_side = 0;

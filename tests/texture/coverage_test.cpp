@@ -243,7 +243,7 @@ TEST(TextureSet, FindsIdenticalTextures) {
     textures.push_back(*bake_texture(folder.file(name), {}, report));
   }
   textures.push_back(textures[0]);
-  textures.back().repeat = true;
+  textures.back().wrap = kTextureRepeat;
   EXPECT_EQ(first_identical(textures), (std::vector<std::size_t>{0, 1, 0, 3}));
 }
 

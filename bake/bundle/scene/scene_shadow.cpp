@@ -43,16 +43,18 @@ const LevelRecord& level_at(const BundleContent& content, const ChunkRecord& chu
 /// A texture's alpha, at a level that a soft shadow needs.
 struct AlphaMask {
   RgbaImage image;  ///< empty: opaque
-  bool repeat = false;
+  std::array<Wrap, 2> wrap{};
 
   [[nodiscard]] double at(const glm::dvec2& uv) const {
     if (image.pixels.empty()) return 1;
-    const auto texel = [this](double x, std::uint32_t side) {
-      const double place = repeat ? x - std::floor(x) : std::clamp(x, 0.0, 1.0);
+    const auto texel = [](double x, std::uint32_t side, Wrap along) {
+      double place = std::clamp(x, 0.0, 1.0);
+      if (along == Wrap::kRepeat) place = x - std::floor(x);
+      if (along == Wrap::kMirror) place = std::fabs(x - 2 * std::round(x / 2));
       return std::min(static_cast<std::uint32_t>(place * side), side - 1);
     };
-    const std::size_t row = texel(uv.y, image.height);
-    return image.pixels[4 * (row * image.width + texel(uv.x, image.width))] / 255.0;
+    const std::size_t row = texel(uv.y, image.height, wrap[1]);
+    return image.pixels[4 * (row * image.width + texel(uv.x, image.width, wrap[0]))] / 255.0;
   }
 };
 
@@ -71,7 +73,7 @@ AlphaMask alpha_mask(const BundleContent& content, std::uint32_t texture) {
       static_cast<TextureFormat>(record.format),
       std::span(content.texture_data[texture]).subspan(place.alpha_offset, place.size), place.width,
       place.height);
-  mask.repeat = (record.flags & kTextureRepeat) != 0;
+  mask.wrap = texture_wrap(record.flags);
   return mask;
 }
 

@@ -42,7 +42,7 @@ bool has_its_size(const BundleView& bundle, const TextureRecord& texture) {
                     stated.find("tier").value_or("").text() != "" || !most;
   TextureOptions options;
   options.mipmaps = texture.level_count > 1;
-  options.repeat = (texture.flags & kTextureRepeat) != 0;
+  options.wrap = texture.flags & kTextureRepeat;
   for (const std::uint64_t limit : {most.value_or(kMaxTextureSide), std::uint64_t{longer}}) {
     if (limit == longer && !free && limit != most) continue;
     options.max_side = static_cast<std::uint32_t>(limit);
@@ -180,7 +180,7 @@ class MipPair {
         blocks_(bundle, texture, level) {
     const TextureRecord& record = bundle.textures()[texture];
     alpha_ = (record.flags & kTextureAlpha) != 0;
-    half_ = resize(finer, image.width, image.height, {(record.flags & kTextureRepeat) != 0, 1});
+    half_ = resize(finer, image.width, image.height, {filters_across(record.flags), 1});
     means_ = alpha_ ? half_ : means(finer, image.width, image.height);
     const auto format = static_cast<TextureFormat>(record.format);
     again_ =

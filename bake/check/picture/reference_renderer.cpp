@@ -9,6 +9,7 @@
 #include <glm/matrix.hpp>
 
 #include "bake/mesh/tri_mesh.hpp"
+#include "bake/texture/texture.hpp"
 #include "formats/base/colour.hpp"
 
 namespace modar {
@@ -76,12 +77,12 @@ glm::dvec4 look_up(const SoftTexture& texture, const glm::dvec2& uv, double leve
 
 Result<std::vector<SoftTexture>> load_textures(const TriMesh& mesh, unsigned jobs) {
   std::vector<SoftTexture> textures(mesh.materials.size());
-  const std::vector<bool> repeats = repeating_materials(mesh);
+  const std::vector<std::uint32_t> repeats = repeating_materials(mesh);
   for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
     if (mesh.uvs.empty() || mesh.materials[m].diffuse_map.empty()) continue;
     MODAR_ASSIGN(const RgbaImage image, read_image(mesh.materials[m].diffuse_map));
-    if (repeats[m]) textures[m].wrap = {Wrap::kRepeat, Wrap::kRepeat};
-    textures[m].levels = mip_chain(image, repeats[m], jobs);
+    textures[m].wrap = texture_wrap(repeats[m]);
+    textures[m].levels = mip_chain(image, filters_across(repeats[m]), jobs);
   }
   return textures;
 }

@@ -13,6 +13,7 @@
 #include "bake/image/image.hpp"
 #include "bake/mesh/tri_mesh.hpp"
 #include "formats/base/error.hpp"
+#include "formats/sections.hpp"
 #include "modar/camera.hpp"
 #include "modar/renderer.hpp"
 

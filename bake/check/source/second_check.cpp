@@ -78,12 +78,10 @@ Result<Look> look_of(const BundleView& bundle, const ModelRecord& model) {
     const float gain = pictured ? export_gain(bundle, record.texture) : 1;
     const glm::dvec3 colour(record.diffuse[0] / gain, record.diffuse[1] / gain,
                             record.diffuse[2] / gain);
-    const bool repeats =
-        pictured && (bundle.textures()[record.texture].flags & kTextureRepeat) != 0;
-    const Wrap wrap = repeats ? Wrap::kRepeat : Wrap::kClamp;
     add_material(look, glm::dvec4(colour, record.opacity),
                  {record.emission[0], record.emission[1], record.emission[2]},
-                 pictured ? images[record.texture].pixels : RgbaImage(), {wrap, wrap});
+                 pictured ? images[record.texture].pixels : RgbaImage(),
+                 texture_wrap(pictured ? bundle.textures()[record.texture].flags : 0));
   }
   for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
     const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];

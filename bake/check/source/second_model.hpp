@@ -11,6 +11,7 @@
 #include <glm/vec4.hpp>
 
 #include "bake/image/image.hpp"
+#include "formats/sections.hpp"
 
 namespace modar {
 

@@ -205,7 +205,7 @@ class MaterialReader {
     m.two_sided = source.doubleSided;
     set_reflection_of(pbr, m);
     set_pictures(source, m);
-    if (!repeats(pbr.baseColorTexture.index)) ++wrapped_;
+    m.beyond = beyond(picture_of(source));
     set_normal_map(source, m);
     m.opacity *= 1 - kClear * transmission_of(source);
     m.ambient = m.diffuse;
@@ -243,8 +243,6 @@ class MaterialReader {
                                        })),
         "have a specular-glossiness map; half of their glossiness sets the highlight of the whole "
         "material");
-    add("gltf.wrap", wrapped_,
-        "ask for clamped or mirrored textures, which are repeated where uvs leave the picture");
     add("gltf.alpha-mask", cut_out_,
         "are cut out at an alpha value: lower values are transparent, the others opaque");
   }
@@ -390,13 +388,31 @@ class MaterialReader {
     return *paths_[index];
   }
 
-  bool repeats(int texture) const {
-    if (texture < 0 || static_cast<std::size_t>(texture) >= gltf_.textures.size()) return true;
+  /// The texture that the others of a material are drawn into.
+  static int picture_of(const tinygltf::Material& material) {
+    for (const int texture :
+         {material.pbrMetallicRoughness.baseColorTexture.index, material.emissiveTexture.index}) {
+      if (texture >= 0) return texture;
+    }
+    return material.occlusionTexture.index;
+  }
+
+  /// What a texture's sampler says, as SourceMaterial::beyond.
+  std::uint32_t beyond(int texture) const {
+    if (texture < 0 || static_cast<std::size_t>(texture) >= gltf_.textures.size()) {
+      return kTextureRepeat;
+    }
     const int sampler = gltf_.textures[static_cast<std::size_t>(texture)].sampler;
-    if (sampler < 0 || static_cast<std::size_t>(sampler) >= gltf_.samplers.size()) return true;
+    if (sampler < 0 || static_cast<std::size_t>(sampler) >= gltf_.samplers.size()) {
+      return kTextureRepeat;
+    }
     const tinygltf::Sampler& stated = gltf_.samplers[static_cast<std::size_t>(sampler)];
-    return stated.wrapS == TINYGLTF_TEXTURE_WRAP_REPEAT &&
-           stated.wrapT == TINYGLTF_TEXTURE_WRAP_REPEAT;
+    const auto along = [](int mode, std::uint32_t mirror, std::uint32_t clamp) -> std::uint32_t {
+      if (mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE) return clamp;
+      return mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? mirror : 0;
+    };
+    return kTextureRepeat | along(stated.wrapS, kTextureMirrorU, kTextureClampU) |
+           along(stated.wrapT, kTextureMirrorV, kTextureClampV);
   }
 
   /// The image of a texture: its PNG or JPEG, or else its WebP (EXT_texture_webp), or its KTX 2
@@ -454,7 +470,6 @@ class MaterialReader {
   int normals_left_out_ = 0;
   int averaged_ = 0;
   int cut_out_ = 0;
-  int wrapped_ = 0;
 };
 
 }  // namespace

@@ -32,8 +32,9 @@ struct Chunk {
 };
 
 struct ChunkedMesh {
-  TriMesh mesh;               ///< without its triangles and their materials, which the chunks hold
-  std::vector<bool> repeats;  ///< repeating_materials() of the mesh when it had its triangles
+  TriMesh mesh;  ///< without its triangles and their materials, which the chunks hold
+  std::vector<std::uint32_t>
+      repeats;  ///< repeating_materials() of the mesh when it had its triangles
   std::vector<Chunk> chunks;
 };
 

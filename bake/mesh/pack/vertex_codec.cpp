@@ -283,7 +283,7 @@ void PackErrors::write(double scale, ModelRecord& record) const {
   record.uv_error_rms_texels = static_cast<float>(uv.rms());
 }
 
-UvRange uv_range(const TriMesh& mesh, const Chunk& chunk, bool repeats) {
+UvRange uv_range(const TriMesh& mesh, const Chunk& chunk, std::uint32_t repeats) {
   UvRange range;
   if (mesh.uvs.empty()) return range;
   glm::dvec2 low(mesh.uvs[chunk.vertices[0]]);
@@ -295,7 +295,9 @@ UvRange uv_range(const TriMesh& mesh, const Chunk& chunk, bool repeats) {
   for (int i = 0; i < 2; ++i) {
     // A texture that repeats looks the same a whole number on; near 0 the device's floats are
     // finer.
-    if (repeats) range.shift[i] = std::floor(low[i]);
+    const Wrap wrap = texture_wrap(repeats)[static_cast<std::size_t>(i)];
+    const double period = wrap == Wrap::kMirror ? 2 : 1;
+    if (wrap != Wrap::kClamp) range.shift[i] = period * std::floor(low[i] / period);
     const double from = low[i] - range.shift[i];
     const double to = high[i] - range.shift[i];
     if (from >= -kUvSlack && to <= 1 + kUvSlack) continue;

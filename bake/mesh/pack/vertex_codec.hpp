@@ -85,8 +85,8 @@ struct UvRange {
   glm::vec2 scale{1.0f};
 };
 
-/// repeats: the chunk's texture repeats, so whole numbers may be subtracted.
-UvRange uv_range(const TriMesh& mesh, const Chunk& chunk, bool repeats);
+/// repeats: TextureFlags of the chunk's texture. Where it repeats, whole numbers may be subtracted.
+UvRange uv_range(const TriMesh& mesh, const Chunk& chunk, std::uint32_t repeats);
 
 /// Greatest and summed squares of one kind of error.
 struct ErrorTally {

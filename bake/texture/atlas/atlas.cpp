@@ -491,7 +491,7 @@ std::vector<Sheet> find_sheets(const AtlasOptions& options, const std::vector<st
   std::vector<Sheet> sheets;
   std::vector<std::uint32_t> candidates;
   for (const std::uint32_t use : uses) {
-    if (use == kNone || textures.uses[use].repeat || textures.uses[use].meshes != 1) continue;
+    if (use == kNone || textures.uses[use].wrap != 0 || textures.uses[use].meshes != 1) continue;
     if (std::find(candidates.begin(), candidates.end(), use) != candidates.end()) continue;
     candidates.push_back(use);
   }
