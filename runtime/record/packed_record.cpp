@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "formats/transport/coded_bytes.hpp"
+#include "modar/pattern_record.hpp"
 #include "runtime/record/record_parts.hpp"
 
 namespace modar {
@@ -277,17 +278,13 @@ Result<std::vector<RecordFeature>> read_features(const PackedHeader& header,
   return features;
 }
 
-bool good_side(int side) {
-  return side >= kSmallestSide && side <= kLargestSide;
-}
-
 /// packed: as long as the whole, of which the header is there.
 Result<PackedHeader> packed_header(std::span<const std::byte> packed) {
   PackedHeader header{};
   if (packed.size() < sizeof header) return broken("it ends in its header");
   std::memcpy(&header, packed.data(), sizeof header);
   if (header.version != kPackedVersion) return broken("its version is unknown");
-  if (!good_side(header.width) || !good_side(header.height)) {
+  if (!is_pattern_size(header.width, header.height)) {
     return broken("a side is not 32 to 1023 pixels");
   }
   if (header.feature_count > kMaxTrackerFeatures) return broken("it has too many features");
@@ -301,7 +298,7 @@ std::optional<std::vector<std::byte>> pack_tracker_record(std::span<const std::b
   TrackerRecordView view;
   if (view_tracker_record(record, view)) return std::nullopt;
   const GrayImage picture = picture_of(view);
-  if (!good_side(picture.width) || !good_side(picture.height)) return std::nullopt;
+  if (!is_pattern_size(picture.width, picture.height)) return std::nullopt;
   const std::vector<ViewLevel> levels = view_levels(picture);
   const std::vector<FeatureKey> keys = keys_of(view);
   const ViewStrip strip(picture.width, picture.height);

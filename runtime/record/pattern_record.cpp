@@ -414,20 +414,15 @@ Result<void> TrackerRecordOptions::validate() const {
   return {};
 }
 
-Result<void> require_pattern_size(int width, int height) {
-  const auto [shorter, longer] = std::minmax(width, height);
-  if (shorter >= kSmallestSide && longer <= kLargestSide) return {};
-  return fail(ExitCode::kInvalidInput, "pattern.loop-size", "",
-              "each side of the picture needs 32 to 1023 pixels",
-              "give a larger picture, or crop it closer to a square");
-}
-
 Result<std::vector<std::byte>> make_tracker_record(const GrayImage& pattern,
                                                    const TrackerRecordOptions& options,
                                                    const PatternSurface& surface,
                                                    double* repeated) {
   MODAR_TRY(options.validate());
-  MODAR_TRY(require_pattern_size(pattern.width, pattern.height));
+  if (!is_pattern_size(pattern.width, pattern.height)) {
+    return fail(ExitCode::kInvalidInput, "pattern.loop-size", "",
+                "each side of the picture needs 32 to 1023 pixels", "give another size");
+  }
   const std::vector<ViewLevel> levels = view_levels(pattern);
   const std::vector<RecordFeature> candidates = find_candidates(levels, surface, options.jobs);
   const Trials trials = run_trials(levels, surface, candidates, options.trial_views, options.jobs);

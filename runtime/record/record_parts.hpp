@@ -18,9 +18,7 @@ inline constexpr int kMargin = 24;
 inline constexpr int kPatchHalf =
     4;  ///< a patch is 9x9 pixels of its level, as the tracker samples
 inline constexpr int kPatchBorder = kPatchHalf + 2;
-inline constexpr int kPatchStep = 2;       ///< pixels between places of patches
-inline constexpr int kLargestSide = 1023;  ///< of TrackerFeatureRecord's 16-bit places in 64ths
-inline constexpr int kSmallestSide = 32;
+inline constexpr int kPatchStep = 2;  ///< pixels between places of patches
 
 /// A feature as one of the baked views shows it.
 struct RecordFeature {

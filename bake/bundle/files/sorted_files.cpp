@@ -156,9 +156,11 @@ Result<void> find_picture(PatternRequest& pattern, std::vector<Diagnostic>& said
   } else {
     const auto [width, height] =
         pattern_sides(static_cast<int>(photo.image.width), static_cast<int>(photo.image.height));
-    if (auto size = require_pattern_size(width, height); !size) {
-      size.error().where = pattern.path;
-      return size;
+    if (!is_pattern_size(width, height)) {
+      return fail(ExitCode::kInvalidInput, "pattern.loop-size", pattern.path,
+                  "the picture has " + std::to_string(width) + "x" + std::to_string(height) +
+                      " pixels, and each side needs 32 to 1023",
+                  "give a larger picture, or crop it closer to a square");
     }
   }
   if (!found.corners && *found.doubt == 0) return {};

@@ -28,8 +28,11 @@ struct TrackerRecordOptions {
   [[nodiscard]] Result<void> validate() const;
 };
 
-/// Errors: kInvalidInput "pattern.loop-size", unless each side has 32 to 1023 pixels.
-Result<void> require_pattern_size(int width, int height);
+/// Whether a record can be made of a picture with these sides, pixels: places in 64ths take 16
+/// bits.
+constexpr bool is_pattern_size(int width, int height) {
+  return width >= 32 && height >= 32 && width <= 1023 && height <= 1023;
+}
 
 /// The bytes of a SectionType::kTrackerRecord section. pattern: 8-bit gray, at most 1023 pixels a
 /// side. The same picture gives the same bytes on every machine. Errors: kInvalidInput
