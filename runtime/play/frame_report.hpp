@@ -85,9 +85,8 @@ class RunStats {
 
   [[nodiscard]] std::uint64_t frames() const { return times_.size(); }
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
-  [[nodiscard]] std::uint64_t skipped() const {
-    return skipped_;
-  }  ///< pictures that cannot be read
+  /// Pictures that cannot be read.
+  [[nodiscard]] std::uint64_t skipped() const { return skipped_; }
   [[nodiscard]] std::uint64_t visible() const { return visible_; }  ///< frames with a detection
   [[nodiscard]] std::uint64_t late() const { return late_; }
   [[nodiscard]] std::uint64_t count(Shown state) const {

@@ -58,7 +58,7 @@ class Kill(ShipTest):
                 continue
             counts[found.group(1)] += 1
             if str(self.store) in line:
-                changes = found.group(1) in CHANGE or "O_CREAT" in line
+                changes = found.group(1) in CHANGE or "O_CREAT" in line or "O_TRUNC" in line
                 if changes or changed or os.environ.get("MODAR_SOAK") == "full":
                     points.append((found.group(1), counts[found.group(1)]))
                 changed = changes
