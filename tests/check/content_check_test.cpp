@@ -2,6 +2,8 @@
 // hash shows breaks one.
 #include "bake/check/content/content_check.hpp"
 
+#include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <functional>
 #include <set>
@@ -13,6 +15,8 @@
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/image/image.hpp"
 #include "formats/base/atomic_file.hpp"
+#include "formats/colour_grid.hpp"
+#include "formats/component.hpp"
 #include "formats/tracker_record.hpp"
 #include "tests/formats/support.hpp"
 
@@ -229,6 +233,31 @@ TEST_F(Content, PatternsAndShadowsFollowFromWhatIsStored) {
   expect("SCENE_CONTENT", [](Bytes& bytes) {
     at(bytes, SectionType::kShadow, sizeof(ShadowHeader) + 64 * 32 + 32) ^= std::byte{8};
   });
+}
+
+TEST_F(Content, TheSmallPictureAndItsColoursAreThoseOfTheRecord) {
+  Bytes whole = good();
+  const std::size_t middle = entry_of(whole, SectionType::kPatternPicture).size / 2;
+  for (const std::size_t offset : {std::size_t{30}, middle}) {
+    expect("PATTERN_CONTENT", [offset](Bytes& bytes) {
+      at(bytes, SectionType::kPatternPicture, offset) ^= std::byte{0x55};
+    });
+  }
+  // Moves a colour on the scale of the limit, 0.3, to which WebP adds at most 0.04 here.
+  const auto moved = [](double by) {
+    return [by](Bytes& bytes) {
+      std::byte* place = &at(bytes, SectionType::kPatternColours, sizeof(ColourGridHeader) + 6 * 9);
+      const double root = std::sqrt(load_number<std::uint16_t>(place) / 65535.0);
+      const double other = root > 0.5 ? root - by : root + by;
+      const auto code = static_cast<std::uint16_t>(std::lround(65535 * other * other));
+      std::memcpy(place, &code, sizeof code);
+    };
+  };
+  expect("PATTERN_CONTENT", moved(0.35));
+  Bytes bytes = good();
+  moved(0.25)(bytes);
+  rehash(bytes);
+  EXPECT_EQ(broken(bytes), std::set<std::string>{});
 }
 
 TEST_F(Content, BundlesOfOtherWritersAreNotLookedAt) {

@@ -18,7 +18,6 @@
 #include "formats/field_table.hpp"
 #include "formats/meta_text.hpp"
 #include "modar/features.hpp"
-#include "modar/packed_record.hpp"
 
 namespace modar {
 
@@ -205,19 +204,6 @@ void check_statements(ContentLog& log) {
   check_parameter_sets(log);
   check_numbers(log);
   check_uses(log);
-}
-
-void check_pictures(ContentLog& log) {
-  if (!log.concerns({SectionType::kTrackerRecord})) return;
-  for (std::uint32_t p = 0; p < log.bundle.patterns().size() && !log.done(); ++p) {
-    const auto record = log.bundle.section(SectionType::kTrackerRecord, p);
-    // Packing finds each feature in the picture again, and fails where one is not there.
-    if (record.empty() || pack_tracker_record(record)) continue;
-    log.tell(WorkstationRule::kPatternContent, log.label("pattern", log.bundle.patterns()[p].name),
-             record.data(),
-             "its picture does not give the features, codes, patches and coarser levels that are "
-             "stored");
-  }
 }
 
 bool check_content(const BundleView& bundle, const IssueSink& sink, const ContentOptions& options) {

@@ -42,7 +42,7 @@ void check_statements(ContentLog& log);
 void check_meshes(ContentLog& log);
 /// Sizes, figures and mip levels.
 void check_textures(ContentLog& log);
-/// Tracker records from the picture that they hold.
+/// Tracker records, small pictures and colours of patterns against the record's picture.
 void check_pictures(ContentLog& log);
 /// Places and shadows of scenes, and draw orders, from the geometry.
 void check_placements(ContentLog& log);
