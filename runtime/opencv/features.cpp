@@ -66,6 +66,10 @@ bool sane(const ParameterSetRecord& set) {
 
 }  // namespace
 
+void use_baseline_instructions() {
+  cv::setUseOptimized(false);
+}
+
 std::span<const ParameterSetRecord> paper_parameter_sets() {
   return kSets;
 }

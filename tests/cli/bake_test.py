@@ -45,6 +45,15 @@ class Bake(ProgramTest):
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual(out.read_bytes(), reference, f"jobs {jobs}, {env}")
 
+    def test_the_bytes_do_not_depend_on_the_processor(self):
+        bundles = []
+        for less in ("", "AVX2,FMA3"):  # the pattern is one whose features differed
+            out = self.folder / f"processor{len(bundles)}.modar"
+            done = self.modar("bake", COVER.parent / "game.png", "-o", out, *QUICK, "--parameters", "all", env={"OPENCV_CPU_DISABLE": less})
+            self.assertEqual(done.returncode, 0, done.stderr)
+            bundles.append(out.read_bytes())
+        self.assertEqual(*bundles)
+
     def keypoints(self, bundle):
         return set(self.modar_json("inspect", bundle)["patterns"][0]["keypoints"])
 

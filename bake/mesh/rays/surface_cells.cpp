@@ -91,7 +91,7 @@ float SurfaceCells::Reader::at(const glm::dvec3& position, const glm::vec3& norm
   const glm::dvec3 place = (position + 1.0) * cells_.cells_a_length_ + 0.5;
   const std::uint64_t key = key_of(place);
   if (key != std::exchange(key_, key)) {
-    for (std::size_t i = 0; i < 8; ++i) {
+    for (std::uint64_t i = 0; i < 8; ++i) {
       const std::uint64_t beside =
           (i & 4) << (2 * kAxisBits - 2) | (i & 2) << (kAxisBits - 1) | (i & 1);
       const Cell& cell = cells_.table_[cells_.slot(key + beside)];

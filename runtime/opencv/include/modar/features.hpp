@@ -25,6 +25,10 @@ struct Features {
 std::span<const ParameterSetRecord> paper_parameter_sets();
 const char* parameter_set_name(std::uint32_t id);
 
+/// Limits OpenCV to the instructions that every processor of the architecture has: its rounding
+/// depends on the others. Call it before threads start.
+void use_baseline_instructions();
+
 /// Detects and describes with the given parameters. image: at least 1x1.
 /// Errors: kInternal "features.opencv" with OpenCV's message; kUnsupported "features.detector".
 Result<Features> describe_image(const GrayImage& image, const ParameterSetRecord& parameters);
