@@ -76,6 +76,11 @@ struct TextureSize {
 /// ES 2.0 asks for; at most options.max_side.
 TextureSize texture_size(TextureSize source, const TextureOptions& options);
 
+/// Factor by which small images are enlarged that the format's blocks cannot represent, such as
+/// palettes: each pixel becomes a block.
+inline constexpr std::uint32_t kEnlarged = 4;
+bool can_be_enlarged(TextureSize source, std::uint32_t max_side);
+
 /// Reads, resizes to powers of two (nearest at or below where larger than max_side; mips on ES 2.0
 /// want them), builds mips, encodes, decodes again and measures PSNR and SSIM. Errors: those of
 /// read_image() and write_png(); kUsage "texture.max-side".

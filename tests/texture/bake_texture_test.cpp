@@ -80,18 +80,60 @@ TEST(BakeTexture, LimitsAndKeepsSizes) {
   EXPECT_EQ(refused.error().exit, ExitCode::kUsage);
 }
 
+/// Pixels of pure colours, none of them like its neighbours.
+RgbaImage pure_colours(std::uint32_t width, std::uint32_t height) {
+  return test::paint(width, height, [](std::uint32_t x, std::uint32_t y) {
+    const std::uint32_t i = (x + 3 * y) % 6 + 1;
+    return std::array<std::uint32_t, 3>{i & 1U ? 255U : 0U, i & 2U ? 255U : 0U, i & 4U ? 255U : 0U};
+  });
+}
+
+TEST(BakeTexture, PalettesAreEnlargedUntilEachPixelIsABlock) {
+  const test::ScratchFolder folder;
+  const RgbaImage palette = pure_colours(256, 1);
+  const Texture texture = bake(write_png(folder, palette), {});
+  EXPECT_EQ(texture.source_width, 256U);
+  ASSERT_EQ(texture.levels[0].width, 1024U);
+  ASSERT_EQ(texture.levels[0].height, 4U);
+  const RgbaImage decoded = decode_texture(texture.format, texture.levels[0].colour, 1024, 4);
+  for (std::size_t i = 0; i < 256; ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {  // at the middle of the pixel
+      const std::size_t at = 4 * (1024 * 2 + 4 * i + 2) + c;
+      EXPECT_NEAR(decoded.pixels[at], palette.pixels[4 * i + c], 8) << i;
+    }
+  }
+}
+
+TEST(BakeTexture, OnlySmallImagesThatBlocksCannotShowAreEnlarged) {
+  const test::ScratchFolder folder;
+  const auto width = [&folder](const RgbaImage& image, const TextureOptions& options = {}) {
+    return bake(write_png(folder, image), options).levels[0].width;
+  };
+  EXPECT_EQ(width(pure_colours(64, 64)), 256U);
+  EXPECT_EQ(width(pure_colours(64, 65)), 64U);
+  const auto slope = [](std::uint32_t x, std::uint32_t y) {
+    return std::array<std::uint32_t, 3>{4 * x, 4 * x, 4 * y / 8 + 2 * x};
+  };
+  EXPECT_EQ(width(test::paint(64, 64, slope)), 64U);
+  TextureOptions options;
+  options.max_side = 256;
+  EXPECT_EQ(width(pure_colours(64, 1), options), 256U);
+  options.max_side = 255;
+  EXPECT_EQ(width(pure_colours(64, 1), options), 64U);
+}
+
 TEST(BakeTexture, AlphaHasATwinOnlyWhereItIsNotConstant) {
   const test::ScratchFolder folder;
-  RgbaImage image = test::synthetic_photo(32, 32);
+  RgbaImage image = test::synthetic_photo(128, 64);
   EXPECT_FALSE(bake(write_png(folder, image), {}).alpha);
   for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
-    image.pixels[i + 3] = static_cast<std::uint8_t>(i / 128 * 8);  // a row is 128 bytes
+    image.pixels[i + 3] = static_cast<std::uint8_t>(i / 512 * 4);  // a row is 512 bytes
   }
   const Texture texture = bake(write_png(folder, image), {});
   EXPECT_TRUE(texture.alpha);
   for (const TextureLevel& level : texture.levels)
     ASSERT_EQ(level.alpha.size(), level.colour.size());
-  const RgbaImage alpha = decode_texture(TextureFormat::kEtc1Rgb, texture.levels[0].alpha, 32, 32);
+  const RgbaImage alpha = decode_texture(TextureFormat::kEtc1Rgb, texture.levels[0].alpha, 128, 64);
   for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
     EXPECT_NEAR(alpha.pixels[i], image.pixels[i + 3], 12);
     EXPECT_EQ(alpha.pixels[i], alpha.pixels[i + 2]);

@@ -263,13 +263,13 @@ TEST(TextureSet, PlansWithinABudget) {
 
 TEST(QualityGate, NamesTheWorstBlockAndDrawsAPicture) {
   const test::ScratchFolder folder;
-  RgbaImage image = test::synthetic_photo(32, 32);
+  RgbaImage image = test::synthetic_photo(128, 64);
   for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
     image.pixels[i] = image.pixels[i + 1] = image.pixels[i + 2] = 90;
   }
   const RgbaImage grains = test::noise(4, 4, 2);
   for (std::size_t y = 0; y < 4; ++y) {
-    std::copy_n(&grains.pixels[y * 16], 16, &image.pixels[((8 + y) * 32 + 20) * 4]);
+    std::copy_n(&grains.pixels[y * 16], 16, &image.pixels[((8 + y) * 128 + 20) * 4]);
   }
   ASSERT_TRUE(write_png(image, folder.file("spot.png")));
   TextureOptions options;
@@ -283,8 +283,8 @@ TEST(QualityGate, NamesTheWorstBlockAndDrawsAPicture) {
   EXPECT_NE(report.diagnostics[0].message.find("20,8"), std::string::npos);
   const Result<RgbaImage> picture = read_image(folder.file("spot.png.png"));
   ASSERT_TRUE(picture) << to_line(picture.error());
-  EXPECT_EQ(picture->width, 96U);
-  EXPECT_EQ(picture->height, 32U);
+  EXPECT_EQ(picture->width, 384U);
+  EXPECT_EQ(picture->height, 64U);
   EXPECT_EQ(picture->pixels[0], 90);
   options.min_psnr_db = 5;
   Report quiet;

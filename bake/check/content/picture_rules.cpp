@@ -82,7 +82,7 @@ double worst_colour(const RgbaImage& shown, std::span<const std::byte> colours) 
   return worst;
 }
 
-/// What is wrong with the small picture or the colours of a flat pattern; empty: nothing.
+/// The fault of a flat pattern's small picture or colours; empty: none.
 std::string preview_fault(const BundleView& bundle, std::uint32_t p) {
   const auto file = bundle.section(SectionType::kPatternPicture, p);
   TrackerRecordView record;

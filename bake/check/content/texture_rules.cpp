@@ -46,8 +46,12 @@ bool has_its_size(const BundleView& bundle, const TextureRecord& texture) {
   for (const std::uint64_t limit : {most.value_or(kMaxTextureSide), std::uint64_t{longer}}) {
     if (limit == longer && !free && limit != most) continue;
     options.max_side = static_cast<std::uint32_t>(limit);
-    const TextureSize size = texture_size({texture.source_width, texture.source_height}, options);
-    if (size.width == texture.width && size.height == texture.height) return true;
+    const TextureSize source = {texture.source_width, texture.source_height};
+    for (const std::uint32_t scale :
+         {1U, can_be_enlarged(source, options.max_side) ? kEnlarged : 1U}) {
+      const TextureSize size = texture_size({scale * source.width, scale * source.height}, options);
+      if (size.width == texture.width && size.height == texture.height) return true;
+    }
   }
   return false;
 }
