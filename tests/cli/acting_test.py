@@ -278,6 +278,7 @@ class Acting(ProgramTest):
                 (('name = "standing"', 'name = "rim"'), "node.same-name", 'name = "rim"\noffset'),
                 (('name = "standing"', 'title.en = "x"'), "project.key", 'title.en = "x"'),
                 (('name = "rim"', 'mark = ""'), "project.value", 'mark = ""'),
+                (('name = "rim"', f'mark = "{"x" * 33}"'), "project.value", 'mark = "x'),
                 (('"map.png"', '"mop.png"'), "project.no-match", 'file = "mop.png"')):
             scene = SCENE.replace(*change, 1)
             done = self.bake(scene)

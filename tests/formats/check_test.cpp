@@ -192,6 +192,17 @@ TEST(Check, NumbersOfTheWorldHaveBounds) {
   }));
 }
 
+TEST(Check, MarksOfLabelsHave1To32Bytes) {
+  for (const std::size_t size : {0u, 1u, 32u, 33u}) {
+    BundleContent content = acting_content();
+    const auto label = std::ranges::find(
+        content.nodes, static_cast<std::uint32_t>(NodeKind::kLabel), &NodeRecord::kind);
+    label->mark = content.intern(std::string(size, 'x'));
+    const std::string first = report(encode(content)).front();
+    EXPECT_EQ(first.starts_with("error BUNDLE_NODE"), size == 0 || size == 33) << first;
+  }
+}
+
 TEST(Check, CornersOfBoxesLieNearTheirPattern) {
   for (const float place : {1e30f, -1e30f, std::numeric_limits<float>::infinity(), 1001.0f}) {
     const std::string said = said_of([place](Bytes& b) {

@@ -76,13 +76,19 @@ TEST(MipChain, ThreadsChangeNothing) {
 }
 
 TEST(MipChain, RepeatReachesAcrossTheEdge) {
-  const RgbaImage image = test::paint(8, 8, [](std::uint32_t x, std::uint32_t) {
-    const int value = x == 7 ? 255 : 0;
-    return std::array<int, 3>{value, value, value};
-  });
-  const RgbaImage clamped = mip_chain(image, false)[1];
-  const RgbaImage repeated = mip_chain(image, true)[1];
-  EXPECT_NE(clamped.pixels, repeated.pixels);
+  for (const std::uint32_t side : {8u, 128u}) {
+    const RgbaImage image = test::paint(side, side, [side](std::uint32_t x, std::uint32_t y) {
+      return std::array<int, 3>{x == side - 1 ? 255 : 0, y == 0 ? 255 : 0, 0};
+    });
+    // The first column and the last row of the half are next to the light only where it repeats.
+    const std::size_t last = std::size_t{side / 2} * (side / 2 - 1) * 4;
+    const RgbaImage clamped = mip_chain(image, false)[1];
+    EXPECT_EQ(clamped.pixels[last], 0) << side;
+    EXPECT_EQ(clamped.pixels[last + 1], 0) << side;
+    const RgbaImage repeated = mip_chain(image, true)[1];
+    EXPECT_GT(repeated.pixels[last], 10) << side;
+    EXPECT_GT(repeated.pixels[last + 1], 10) << side;
+  }
 }
 
 TEST(Resize, IsTheSameInBandsAsInOnePiece) {

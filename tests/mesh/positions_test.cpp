@@ -58,6 +58,18 @@ glm::dvec3 decoded(const PackedMesh& mesh, const ChunkRecord& chunk, std::size_t
   return p;
 }
 
+/// Degrees between a vertex's normal, three signed bytes decoded as bundle.md says, and another.
+double normal_error(const PackedMesh& mesh, std::size_t vertex, const glm::dvec3& wanted) {
+  const std::byte* at = mesh.vertices.data() + vertex * mesh.layout.stride +
+                        mesh.layout.attributes[1].offset;
+  glm::dvec3 normal;
+  for (int i = 0; i < 3; ++i) {
+    normal[i] = (2.0 * static_cast<double>(static_cast<std::int8_t>(at[i])) + 1.0) / 255.0;
+  }
+  const double cosine = glm::dot(glm::normalize(normal), glm::normalize(wanted));
+  return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / 3.14159265358979323846;
+}
+
 /// Each source corner's nearest decoded vertex of its chunk must be one and the same point wherever
 /// the vertex appears, and no farther off than stated.
 void expect_no_cracks(const ChunkedMesh& mesh, const PackedMesh& bytes) {
@@ -65,17 +77,20 @@ void expect_no_cracks(const ChunkedMesh& mesh, const PackedMesh& bytes) {
   std::uint64_t shared = 0;
   double greatest = 0;
   double squares = 0;
+  double turns = 0;
   std::uint64_t count = 0;
   for (std::size_t c = 0; c < mesh.chunks.size(); ++c) {
     const ChunkRecord& chunk = bytes.chunks[c];
     const LevelRecord& level = bytes.levels[chunk.first_level];
     std::vector<glm::dvec3> points;
+    std::vector<std::size_t> vertices;
     std::set<std::uint16_t> used;
     for (std::uint32_t i = 0; i < level.index_count; ++i) {
       std::uint16_t index = 0;
       std::memcpy(&index, bytes.indices.data() + level.index_offset + 2 * i, 2);
       if (used.insert(index).second) {
-        points.push_back(decoded(bytes, chunk, level.vertex_offset / bytes.layout.stride + index));
+        vertices.push_back(level.vertex_offset / bytes.layout.stride + index);
+        points.push_back(decoded(bytes, chunk, vertices.back()));
       }
     }
     for (const std::uint32_t v : mesh.chunks[c].vertices) {
@@ -87,6 +102,11 @@ void expect_no_cracks(const ChunkedMesh& mesh, const PackedMesh& bytes) {
       const double error = glm::length(*nearest - p) * mesh.mesh.placement.scale;
       greatest = std::max(greatest, error);
       squares += error * error;
+      if (bytes.layout.attributes[1].components == 3) {
+        const auto index = static_cast<std::size_t>(nearest - points.begin());
+        const double turn = normal_error(bytes, vertices[index], glm::dvec3(mesh.mesh.normals[v]));
+        turns += turn * turn;
+      }
       ++count;
       const auto [at, fresh] = point_of_source.emplace(mesh.mesh.source_position(v), *nearest);
       if (fresh) continue;
@@ -97,6 +117,8 @@ void expect_no_cracks(const ChunkedMesh& mesh, const PackedMesh& bytes) {
   EXPECT_GT(shared, 30u) << "chunks share nothing: the test proves nothing";
   EXPECT_NEAR(greatest, bytes.record.position_error_max, 1e-12 * bytes.record.diagonal);
   EXPECT_NEAR(std::sqrt(squares / double(count)), bytes.record.position_error_rms, 1e-9 * greatest);
+  if (bytes.layout.attributes[1].components != 3) return;
+  EXPECT_NEAR(std::sqrt(turns / double(count)), double(bytes.record.normal_error_rms_deg), 1e-4);
 }
 
 TEST(Positions, SharedVerticesDecodeToOnePointInAllLayouts) {

@@ -214,6 +214,7 @@ TEST(Score, RisesWithTheGrade) {
   for (const auto& [far, grade] : limits) {
     const ScoreRange range{0.5, far, 70, 1.0};
     EXPECT_EQ(grade_of(range), grade);
+    EXPECT_EQ(grade_of({0.5, far - 0.01, 70, 1.0}), grade + 1);
     EXPECT_LT(modar::score_of(range), last);
     last = modar::score_of(range);
   }

@@ -28,6 +28,7 @@ class Element extends EventTarget {
   getContext() { return null; }
   getBoundingClientRect() { return { left: 0, top: 0 }; }
   setPointerCapture() {}
+  focus() {}
   removeAttribute() {}
   async play() {}
 }
@@ -54,7 +55,7 @@ for (const [name, value] of Object.entries({
 const PATTERN = { name: 'cover', file: 'cover.png', kind: 'flat', sides: {}, corners: null, width_mm: null, height_mm: null };
 const project = { revision: '1', patterns: [PATTERN], models: [], scenes: [], problems: [], bundle: {}, languages: ['en'], phone: null };
 const module = (name) => import(pathToFileURL(path.join(folder, name)));
-const [{ Picture }, { placed }, { Stage }, { sideName, surfaceOf }, { state }, { Try }] =
+const [{ Picture }, placing, { Stage }, { sideName, surfaceOf }, { state }, { Try }] =
   await Promise.all(['picture', 'placing', 'stage', 'surface', 'state', 'try'].map((name) => module(`${name}.js`)));
 state.project = project;
 const settled = () => new Promise((resolve) => { setTimeout(resolve, 20); });
@@ -78,7 +79,7 @@ test('a box keeps the pictures of its top and bottom when its depth changes', as
 
 test('an offset in millimetres on a picture of unknown width is finite', () => {
   const scene = { pattern: 'cover', offset: [10, 0, 5], offset_unit: 'mm', turn: [0, 0, 0], size: { kind: 'scale', value: 1 }, up: null, centred: false };
-  const { matrix } = placed(scene, undefined, null);
+  const { matrix } = placing.placed(scene, undefined, null);
   assert.ok(matrix.every(Number.isFinite), `${matrix}`);
 });
 
@@ -109,6 +110,252 @@ test('a finger that stays after a pinch moves nothing and fails nothing', () => 
   dom.onpointerup(event('pointerup', 2, 200));
   dom.onpointermove(event('pointermove', 1, 50));
   assert.deepEqual(zooms, [2]);
+});
+
+// A unit is 100 pixels at the ground, below an eye 10 above it (x right, y up) or before one that looks along y (z up).
+const SIZE = { width: 400, height: 300 };
+const ABOVE = { view: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -10, 1], focal: 1000, size: SIZE };
+const BEFORE = { view: [1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, -10, 1], focal: 1000, size: SIZE };
+const near = (got, wanted, within = 1e-6) => {
+  assert.equal(got.length, wanted.length);
+  got.forEach((value, i) => assert.ok(Math.abs(value - wanted[i]) < within, `${got} is not ${wanted}`));
+};
+
+/** A stage with a cube of side 1 whose foot is at x 1, y 0.5; what it changes. */
+function staged(eye, foot = [1, 0.5, 0]) {
+  const changes = [];
+  const scene = { key: 'a', half: [1, 1, 1], matrix: [0.5, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 0.5, 0, foot[0], foot[1], foot[2] + 0.5, 1] };
+  const stage = new Stage(new Element(), { change: (_, change) => changes.push(change), select() {}, words: () => '' });
+  Object.assign(stage, { scenes: [scene], selected: 'a', eye: () => eye });
+  return { stage, changes };
+}
+
+/** What a handle dragged from a place on the screen to another changes. */
+function dragged(kind, eye, from, to, { free = false, foot = undefined } = {}) {
+  const { stage: { dom }, changes } = staged(eye, foot);
+  const handle = Object.assign(new Element(), { dataset: { handle: kind } });
+  handle.closest = (selector) => (selector === '[data-handle]' ? handle : null);
+  const event = (type, [clientX, clientY]) =>
+    Object.assign(new Event(type, { cancelable: true }), { pointerId: 1, button: 0, clientX, clientY, pointerType: 'mouse', altKey: free });
+  dom.dispatchEvent(Object.defineProperty(event('pointerdown', from), 'target', { value: handle }));
+  dom.onpointermove(event('pointermove', to));
+  dom.onpointerup(event('pointerup', to));
+  assert.equal(changes.length, 1);
+  return changes[0];
+}
+
+test('the handle moves a model across the picture, and snaps to its middle', () => {
+  near(dragged('move', ABOVE, [300, 100], [330, 80]).move, [0.3, 0.2, 0]);
+  near(dragged('move', ABOVE, [300, 100], [206, 144]).move, [-1, -0.5, 0]);  // 6 pixels are left
+  near(dragged('move', ABOVE, [300, 100], [208, 142]).move, [-0.92, -0.42, 0]);
+  near(dragged('move', ABOVE, [300, 100], [206, 144], { free: true }).move, [-0.94, -0.44, 0]);
+});
+
+test('the handles lift, size and turn a model', () => {
+  // Its middle is 10.5 away: 95 pixels a unit.
+  near(dragged('lift', BEFORE, [300, 100], [300, 80]).move, [0, 0, 0.21], 1e-3);
+  near(dragged('lift', BEFORE, [300, 100], [300, 80], { foot: [1, 0.5, -0.25] }).move, [0, 0, 0.25]);  // rests on the picture
+  near(dragged('lift', BEFORE, [300, 100], [300, 80], { foot: [1, 0.5, -0.25], free: true }).move, [0, 0, 0.21], 1e-3);
+  near([dragged('size', ABOVE, [330, 60], [360, 20]).size], [2]);
+  near([dragged('size', ABOVE, [330, 60], [300, 100]).size], [0.02]);
+  const turned = (degrees, as) => {
+    const [cosine, sine] = [Math.cos(degrees * Math.PI / 180), Math.sin(degrees * Math.PI / 180)];
+    return dragged('turn', ABOVE, [350, 100], [300 + 50 * cosine, 100 - 50 * sine], as).turn;
+  };
+  near(turned(52), [2, 52]);
+  near(turned(47.4), [2, 45]);
+  near(turned(47.6), [2, 47.6]);
+  near(turned(-92), [2, -90]);
+  near(turned(-92, { free: true }), [2, -92]);
+  near(dragged('tilt1', BEFORE, [340, 102], [295, 57]).turn, [1, -90]);  // its middle is at 295, 102
+});
+
+test('arrow keys move, turn and size by steps, and are told when they rest', () => {
+  const pressed = (kind, keys, unit = null) => {
+    const { stage, changes } = staged(ABOVE);
+    stage.unit = unit;
+    const button = Object.assign(new Element(), { dataset: { handle: kind }, closest: () => button });
+    for (const [key, shiftKey = false] of keys) {
+      const event = Object.assign(new Event('keydown', { cancelable: true }), { key, shiftKey });
+      stage.dom.dispatchEvent(Object.defineProperty(event, 'target', { value: button }));
+    }
+    assert.equal(changes.length, 0);
+    stage.dom.dispatchEvent(new Event('focusout'));
+    assert.equal(changes.length, 1);
+    return changes[0];
+  };
+  near(pressed('move', [['ArrowRight'], ['ArrowRight'], ['ArrowDown']]).move, [0.02, -0.01, 0]);
+  near(pressed('move', [['ArrowLeft', true]]).move, [-0.05, 0, 0]);
+  near(pressed('move', [['ArrowUp'], ['ArrowLeft', true]], 50).move, [-0.2, 0.02, 0]);  // 1 and 10 mm
+  near(pressed('lift', [['ArrowUp']]).move, [0, 0, 0.01]);
+  near(pressed('turn', [['ArrowRight'], ['ArrowUp', true]]).turn, [2, 16]);
+  near(pressed('tilt0', [['ArrowDown']]).turn, [0, -1]);
+  near([pressed('size', [['ArrowUp'], ['ArrowUp', true]]).size], [1.01 * 1.1]);
+});
+
+test('dragging the ground orbits, within limits as the zoom', () => {
+  const { stage } = staged(ABOVE);
+  delete stage.eye;
+  Object.assign(stage.dom, { clientWidth: 400, clientHeight: 300 });
+  stage.orbit(0.32, 0);  // from behind the picture's lower edge, 0.66 up
+  const heightOf = () => { const [, y] = placing.onScreen(stage.eye(), [0, 0, 1]); return 150 - y; };
+  const tilted = heightOf();
+  stage.orbit(0, 10);
+  near([heightOf()], [0], 1e-4);  // from straight above
+  stage.orbit(0, -10);
+  assert.ok(heightOf() > tilted);
+  // A ball of radius 1, 40 degrees across with a margin of 1.12: tan 20 of half the height that far away.
+  const across = 150 / Math.tan(Math.PI / 9) / (1.12 / Math.sin(Math.PI / 9));
+  const width = () => placing.onScreen(stage.eye(), [1, 0, 0])[0] - 200;
+  near([width()], [across], 1e-3);
+  stage.zoom(100);
+  near([width()], [8 * across], 1e-2);
+  stage.zoom(1e-4);
+  near([width()], [0.4 * across], 1e-3);
+});
+
+/** A stage on the screen, the picture from -1 to 1, drawn when `frames` are called. */
+const frames = [];
+function seen() {
+  frames.length = 0;
+  define('requestAnimationFrame', (frame) => frames.push(frame));
+  define('matchMedia', () => ({ matches: false }));
+  const { stage, changes } = staged(ABOVE);
+  const drawn = { buttons: ['move', 'lift', 'turn', 'size', 'tilt0', 'tilt1'].map((handle) => Object.assign(new Element(), { dataset: { handle } })),
+    lines: Object.fromEntries(['ring', 'stem', 'tilt0', 'tilt1', 'box', 'snap'].map((line) => [line, ''])), ground: new Element(), tip: new Element() };
+  const paths = Object.keys(drawn.lines).map((line) => ({ dataset: { line }, setAttribute: (_, d) => { drawn.lines[line] = d; } }));
+  Object.assign(stage.dom, { clientWidth: 400, clientHeight: 300, querySelector: (selector) => drawn[selector.slice(1)] ?? new Element(),
+    querySelectorAll: (selector) => (selector === '.guides path' ? paths : drawn.buttons) });
+  stage.surface = { paint() {} };
+  stage.told.words = ({ move }) => `${move}`;
+  const show = (as = {}) => stage.show({ pattern: { name: 'cover' }, scenes: stage.scenes, selected: 'a', tilting: true,
+    surface: { low: [-1, -1, 0], high: [1, 1, 0], unit: null, faces: [] }, ...as });
+  return { stage, drawn, show, changes };
+}
+
+test('the eye glides to a look, and stops there', () => {
+  const [gliding, half, there] = [seen(), seen(), seen()];
+  for (const { stage, show } of [gliding, half, there]) { delete stage.eye; show(); }
+  frames.splice(0).forEach((frame) => frame(0));
+  there.stage.orbit(0.32, 0.035 - 0.66);
+  half.stage.orbit(0.32 * 7 / 8, (0.035 - 0.66) * 7 / 8);  // all but the cube of what is left
+  frames.length = 0;
+  const now = performance.now;
+  performance.now = () => 5000;
+  gliding.stage.zoom(2);
+  gliding.stage.look('side');
+  performance.now = now;
+  frames.shift()(5130);
+  frames.length = 1;
+  half.stage.zoom(1 + 1 / 8);
+  near([...gliding.stage.eye().view], [...half.stage.eye().view], 1e-4);
+  assert.equal(frames.length, 1);
+  frames.shift()(5300);
+  near([...gliding.stage.eye().view], [...there.stage.eye().view]);
+  assert.equal(frames.length, 0);
+});
+
+test('handles and guides are where the model is', () => {
+  const { stage, drawn, show } = seen();
+  stage.eye = () => BEFORE;
+  show();
+  frames.shift()(0);
+  const places = () => Object.fromEntries(drawn.buttons.filter(({ hidden }) => !hidden)
+    .map(({ dataset: { handle }, style: { left, top } }) => [handle, [left, top].map((each) => Math.round(parseFloat(each)))]));
+  // Its box is from 0.5, 0, 0 to 1.5, 1, 1; half of its side and a quarter more are around it.
+  assert.deepEqual(places(), { move: [295, 150], lift: [295, 34], turn: [253, 150], size: [350, 50], tilt0: [301, 87], tilt1: [243, 73] });
+  assert.deepEqual(['ring', 'tilt0', 'tilt1'].map((line) => drawn.lines[line].slice(0, 11)), ['M354.8 150.', 'M289.9 105.', 'M295.2 42.9']);
+  assert.equal(drawn.lines.stem, 'M295.2 54.8L295.2 33.8');
+  assert.ok(drawn.lines.box.startsWith('M250.0 150.0L350.0 150.0L336.4 150.0L245.5 150.0L250.0 150.0ZM'.replace('ZM', 'M')), drawn.lines.box);
+  assert.equal(drawn.tip.hidden, true);
+  stage.eye = () => ABOVE;
+  show({ tilting: false });
+  frames.shift()(0);
+  assert.deepEqual(places(), { move: [300, 100], turn: [254, 142], size: [367, 150] });  // lifting has no direction
+  assert.equal(drawn.lines.tilt0, '');
+  show({ selected: null });
+  frames.shift()(0);
+  assert.deepEqual([places(), drawn.lines.ring], [{}, '']);
+});
+
+test('what is dragged is told while it moves, and pressed models are selected', () => {
+  const { stage, drawn, show, changes } = seen();
+  show({ tilting: false });
+  stage.eye = () => ABOVE;
+  const selected = [];
+  stage.told.select = ({ key }) => selected.push(key);
+  const event = (type, [clientX, clientY]) =>
+    Object.assign(new Event(type, { cancelable: true }), { pointerId: 1, button: 0, clientX, clientY, pointerType: 'mouse', altKey: false });
+  const press = (at, button = 0) =>
+    stage.dom.dispatchEvent(Object.defineProperty(Object.assign(event('pointerdown', at), { button }), 'target', { value: stage.dom }));
+  press([300, 100]);
+  stage.dom.onpointermove(event('pointermove', [204, 100]));
+  assert.equal(drawn.tip.textContent, '-1,0,0');
+  assert.deepEqual([drawn.tip.hidden, drawn.tip.style], [false, { left: '200px', top: '59px' }].map((each, i) => (i ? drawn.tip.style : each)));
+  assert.equal(drawn.lines.snap, 'M200.0 250.0L200.0 50.0');
+  stage.dom.onpointercancel(event('pointercancel', [204, 100]));
+  assert.deepEqual([selected, changes], [[], []]);
+  stage.selected = null;
+  const orbits = [];
+  stage.orbit = (...by) => orbits.push(by);
+  // Its box is drawn up to 366.7; 8 pixels more still mean it.
+  for (const x of [376, 373]) {
+    press([x, 95]);
+    stage.dom.onpointermove(event('pointermove', [x + 16, 95 + 32]));
+    stage.dom.onpointerup(event('pointerup', [x + 16, 95 + 32]));
+  }
+  assert.deepEqual([selected, orbits], [['a'], [[-0.1, 0.2]]]);
+  press([300, 100], 2);
+  assert.equal(stage.dom.onpointermove, null);
+  for (const [type, at, cursor] of [['mouse', [300, 100], 'move'], ['mouse', [20, 20], 'grab'], ['touch', [300, 100], 'grab']]) {
+    stage.dom.dispatchEvent(Object.assign(event('pointermove', at), { pointerType: type }));
+    assert.equal(stage.dom.style.cursor, cursor);
+  }
+});
+
+test('matrices turn about axes, and turns are read from them', () => {
+  const { about, boxOf, inverse, multiply, rotation, scaling, transform, translation, turning, turnOf, wrapped } = placing;
+  // A quarter about each axis takes the next axis to the one after it.
+  for (const axis of [0, 1, 2]) {
+    const unit = (at) => [0, 1, 2].map((i) => Number(i === at % 3));
+    near(transform(rotation(axis, 90), unit(axis + 1)), unit(axis + 2));
+  }
+  near(turnOf(multiply(scaling(3), turning([20, -30, 50]))), [20, -30, 50]);
+  near(turnOf(turning([0, 90, 25])), [0, 90, 25]);
+  near(transform(about([1, 2, 3], rotation(2, 90)), [2, 2, 3]), [1, 3, 3]);
+  const matrix = multiply(translation([1, 2, 3]), multiply(turning([20, -30, 50]), scaling(2)));
+  near(transform(inverse(matrix), transform(matrix, [4, 5, 6])), [4, 5, 6]);
+  assert.deepEqual([180, -180, 181, -541, 360].map(wrapped), [180, 180, -179, 179, 0]);
+  const { low, high, foot } = boxOf(multiply(translation([1, 2, 3]), rotation(2, 90)), [0.5, 0.25, 1]);
+  near([...low, ...high, ...foot], [0.75, 1.5, 2, 1.25, 2.5, 4, 1, 2, 2]);
+});
+
+test('places on the screen, lines of sight, and what is under a place', () => {
+  const { covers, meet, onScreen, sight } = placing;
+  near(onScreen(ABOVE, [1, 0.5, 0]), [300, 100]);
+  assert.equal(onScreen(ABOVE, [0, 0, 11]), null);
+  near(meet(sight(ABOVE, [300, 100]), [0, 0, 0], [0, 0, 1]), [1, 0.5, 0]);
+  assert.equal(meet(sight(ABOVE, [300, 100]), [0, 0, 12], [0, 0, 1]), null);  // behind the eye
+  assert.equal(meet({ from: [0, 0, 1], along: [1, 0, 0] }, [0, 0, 0], [0, 0, 1]), null);
+  const box = { low: [-1, -0.5, 0], high: [1, 0.5, 0] };  // from 100, 100 to 300, 200
+  for (const [x, y, margin, inside] of [[299, 101, 0, true], [301, 150, 0, false], [301, 150, 2, true], [303, 150, 2, false], [200, 98.5, 2, true],
+    [200, 97, 2, false], [98.5, 150, 2, true], [200, 201.5, 2, true]]) assert.equal(covers(ABOVE, box, [x, y], margin), inside, `${x} ${y} ${margin}`);
+});
+
+test('a scene stands as modar.toml says', () => {
+  const scene = { pattern: 'cover', offset: [0, 0, 0], offset_unit: 'usual', turn: [0, 0, 0], size: { kind: 'scale', value: 1 }, up: null, centred: false };
+  const model = { size: [1, 4, 2], up: 'y' };
+  const placed = (as, unit = null, of = model) => placing.placed({ ...scene, ...as }, of, unit);
+  const up = (axis, sign) => [0, 1, 2].map((i) => (i === axis ? sign : 0));
+  for (const [name, axis, sign] of [['x', 0, 1], ['-x', 0, -1], ['y', 1, 1], ['-y', 1, -1], ['z', 2, 1], ['-z', 2, -1]]) {
+    const { matrix } = placed({ up: name });
+    near(placing.transform(matrix.with(12, 0).with(13, 0).with(14, 0), up(axis, sign)), [0, 0, 1]);
+  }
+  near(placed({}).matrix.slice(12, 15), [0, 0, 1]);  // its foot is on the picture
+  near(placed({ centred: true, offset: [0.5, 0, 0.25] }).matrix.slice(12, 15), [1, 0, 0.5]);
+  near(placed({ offset: [10, 0, 0] }, 50).matrix.slice(12, 15), [0.2, 0, 1]);
+  near([placed({ size: { kind: 'height', value: 100 } }, 50).scale, placed({ size: { kind: 'width', value: 100 } }, 50).scale], [1, 4]);
+  near(placing.halfOf(model), [0.25, 1, 0.5]);
 });
 
 test('a side of a box is named from the folder of its front, as the bake reads it', () => {

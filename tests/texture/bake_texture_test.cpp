@@ -207,6 +207,16 @@ TEST(BakeTexture, FoliageKeepsItsCoverageWithDistance) {
         decode_texture(texture.format, stored.alpha, stored.width, stored.height);
     EXPECT_NEAR(covered_share(alpha), share, 0.1) << level;
   }
+  // A tenth may be soft, between 1/10 and 9/10.
+  for (const auto& [soft, alpha, cut] : std::initializer_list<std::array<int, 3>>{
+           {25, 128, 1}, {26, 128, 0}, {26, 25, 1}, {26, 26, 0}, {26, 229, 0}, {26, 230, 1}}) {
+    RgbaImage fence = test::synthetic_photo(16, 16);
+    for (std::size_t i = 0; i < 256; ++i) {
+      const bool rim = static_cast<int>(i) < soft;
+      fence.pixels[4 * i + 3] = static_cast<std::uint8_t>(rim ? alpha : i < 128 ? 255 : 0);
+    }
+    EXPECT_EQ(bake(write_png(folder, fence), {}).cut_out, cut == 1) << soft << ' ' << alpha;
+  }
   // A soft veil stays what it is.
   for (std::size_t i = 0; i < leaves.pixels.size(); i += 4) {
     leaves.pixels[i + 3] = static_cast<std::uint8_t>(i / 4 % 256);
