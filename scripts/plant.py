@@ -35,6 +35,8 @@ TESTS = {
     "bake/image": ["import_test|texture_pipeline_test", "cli_(bake|files|pattern)"],
     "bake/video": ["cli_(media|acting|play)"],
     "bake/import": ["import_test", "cli_(bake|files)"],
+    "bake/memory": ["mesh_test"],
+    "bake/process": ["cli_(web|report)"],
     "bake/mesh": ["mesh_test|budget_test", "mesh_oracle_test", "cli_(bake|check)"],
     "bake/texture": ["(texture_pipeline|atlas|etc1|mesa_etc1)_test", "cli_bake"],
     "bake/pattern": ["pattern_test", "cli_(pattern|rectify)"],

@@ -52,6 +52,13 @@ class Plant(unittest.TestCase):
         self.assertNotEqual(first(1), first(2))
         self.assertEqual({kind for kind, _ in first(1)}, {"comparison", "constant", "dropped", "early return", "sign", "swapped"})
 
+    def test_rooms_share_the_faults_by_their_lines(self):
+        share = plant.shares(list(plant.TESTS), 300)
+        self.assertEqual((sum(share.values()), min(share.values())), (300, 4))
+        self.assertGreater(share["bake/mesh"], share["bake/pattern"])
+        self.assertEqual(plant.room_of("formats/transport/packed.cpp"), "formats/transport")
+        self.assertFalse([name for name in plant.sources("formats") if name.startswith("formats/transport/")])
+
     def test_each_room_has_tests(self):
         self.assertEqual(plant.tests_of("bake/mesh/weld"), plant.TESTS["bake/mesh"])
         for room in plant.TESTS:
