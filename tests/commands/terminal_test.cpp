@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace modar {
 namespace {
 
@@ -39,6 +41,32 @@ TEST(Losses, AreTheTexturesAndManyFacesOfAModelEachOnce) {
             "not complete: texture 'a.png' was not found\n"
             "not complete: 2 of 30 faces could not be used\n"
             "not complete: 'b.png': it is cut short; grey replaces it\n");
+}
+
+TEST(Findings, AreFourKindsOfNotesAndThreeWarningsOfAKind) {
+  const auto said = [](DiagnosticSeverity severity, const std::vector<std::string>& ids, bool all) {
+    std::vector<Diagnostic> findings;
+    for (const std::string& id : ids) {
+      findings.push_back({id, severity, "a.obj", findings.size() + 1, "it is odd", ""});
+    }
+    testing::internal::CaptureStderr();
+    print_findings(findings, all);
+    const std::string text = testing::internal::GetCapturedStderr();
+    return std::pair{std::ranges::count(text, '\n'), text};
+  };
+  constexpr auto kInfo = DiagnosticSeverity::kInfo;
+  EXPECT_EQ(said(kInfo, {"a", "b", "c", "d"}, false).first, 4);
+  EXPECT_EQ(said(kInfo, {"a", "b", "c", "d"}, false).second.find("more"), std::string::npos);
+  const auto [lines, text] = said(kInfo, {"a", "b", "c", "d", "e", "e"}, false);
+  EXPECT_EQ(lines, 5);
+  EXPECT_TRUE(text.ends_with("\nnote: 2 more notes; --notes shows them\n")) << text;
+  EXPECT_EQ(said(kInfo, {"a", "b", "c", "d", "e", "e"}, true).first, 6);
+  constexpr auto kWarning = DiagnosticSeverity::kWarning;
+  EXPECT_EQ(said(kWarning, {"a", "a", "a", "b"}, false).first, 4);
+  EXPECT_EQ(said(kWarning, {"a", "a", "a", "b"}, false).second.find("more"), std::string::npos);
+  const auto [few, more] = said(kWarning, {"a", "a", "a", "a", "a"}, false);
+  EXPECT_EQ(few, 3);
+  EXPECT_NE(more.find("; 2 more of this kind: --notes shows them [a]\n"), std::string::npos);
 }
 
 TEST(ProcessCost, IsPositive) {

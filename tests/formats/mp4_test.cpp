@@ -54,6 +54,18 @@ TEST(Mp4, RefusesBoxesThatDoNotFit) {
   bytes[4] = std::byte{'x'};
   EXPECT_EQ(fault_of(bytes), "it does not begin as an MP4 file (ftyp)");
   EXPECT_EQ(fault_of({}), "there is no index (moov)");
+  // A size of 64 bits, and one up to the file's end.
+  const auto ends_with = [](const std::string& box) {
+    Bytes all = small_mp4(640, 360, 12);
+    for (const char c : box) all.push_back(static_cast<std::byte>(c));
+    return fault_of(all);
+  };
+  using namespace std::string_literals;
+  EXPECT_EQ(ends_with("\0\0\0\1free\0\0\0\0\0\0\0\x10"s), "");
+  EXPECT_EQ(ends_with("\0\0\0\1free\0\0\0\0\0\0\0\x0F"s),
+            "a box extends past the one that contains it");
+  EXPECT_EQ(ends_with("\0\0\0\1free\0\0\0\0\0\0\0"s), "a box has no room for its size");
+  EXPECT_EQ(ends_with("\0\0\0\0free12"s), "");
   // Empty boxes without end.
   bytes = Bytes(8 * 5000);
   for (std::size_t i = 0; i < bytes.size(); i += 8) {

@@ -100,6 +100,22 @@ TEST_F(Gltf, NodesMoveTheirMeshes) {
   EXPECT_NEAR(static_cast<double>(model->materials[0].diffuse.y), 0.5, 0.001);
 }
 
+// Section 3.7.2.1 of the glTF 2.0 specification; fans begin at another corner of the same triangle.
+TEST_F(Gltf, StripsAndFansAreTriangles) {
+  const std::pair<int, std::vector<std::uint32_t>> kinds[] = {
+      {4, {0, 1, 2}}, {5, {0, 1, 2, 1, 3, 2, 2, 3, 4}}, {6, {0, 1, 2, 0, 2, 3, 0, 3, 4}}};
+  for (const auto& [mode, corners] : kinds) {
+    const auto model =
+        read(R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":60}],"accessors":[
+            {"bufferView":0,"componentType":5126,"count":5,"type":"VEC3"}],"meshes":[{"primitives":
+            [{"attributes":{"POSITION":0},"mode":)" +
+                 std::to_string(mode) + R"(}]}],"nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])",
+             raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 0, 2, 0}));
+    ASSERT_TRUE(model) << to_line(model.error());
+    EXPECT_EQ(std::vector(model->corner_positions.begin(), model->corner_positions.end()), corners);
+  }
+}
+
 /// Three vertices: one on each of two joints, one on both. The second joint is 2 along x, a quarter
 /// turn about z, and was bound where it stands without the turn.
 std::string skinned_triangle(int last_joint = 1) {

@@ -11,6 +11,7 @@
 #include "formats/bundle_view.hpp"
 #include "formats/tracker_record.hpp"
 #include "formats/transport/coded_bytes.hpp"
+#include "formats/transport/recipe.hpp"
 #include "formats/transport/stages.hpp"
 #include "modar/packed_record.hpp"
 #include "modar/pattern_record.hpp"
@@ -83,6 +84,21 @@ TEST(CodedBytes, ComeBackAndBecomeLess) {
   // A counter that only its place in a record tells: 4000 bytes, one in six of which changes.
   EXPECT_LT(encode_bytes(samples()[4], 6).size(), 350u);
   EXPECT_LT(encode_bytes(samples()[3], 1).size(), 3100u) << "noise";
+}
+
+// Recorded hashes: packed bundles of earlier versions decode, so shipping.md keeps these bytes.
+TEST(CodedBytes, StayAsTheyAre) {
+  Bytes raw;
+  for (const Bytes& sample : samples()) {
+    for (const std::uint32_t stride : {1u, 6u, 16u, kMostCodedStride}) {
+      const Bytes coded = encode_bytes(sample, stride);
+      raw.insert(raw.end(), coded.begin(), coded.end());
+    }
+  }
+  EXPECT_EQ(raw_hash(raw), 10649338886243673461u);
+  GrayPicture wild = discs(120, 80);
+  for (std::size_t x = 0; x < 120; ++x) wild.pixels[120 * 40 + x] = x % 2 == 0 ? 0 : 255;
+  EXPECT_EQ(raw_hash(encode_picture(wild.pixels, 120)), 5210534267697569889u);
 }
 
 TEST(CodedBytes, ThatEndTooEarlyAreRefused) {
