@@ -230,7 +230,7 @@ class Tests:
         return code in (0, test.get("SKIP_RETURN_CODE", 0))
 
     def object_of(self, path):
-        """What the compiler makes of a file; None for what is not compiled. False: it does not compile."""
+        """What the compiler makes of a file; None for a file that is not compiled. False: it does not compile."""
         if not path.endswith(".cpp"):
             return None
         source = str(TREE / path)

@@ -60,8 +60,8 @@ glm::dvec3 decoded(const PackedMesh& mesh, const ChunkRecord& chunk, std::size_t
 
 /// Degrees between a vertex's normal, three signed bytes decoded as bundle.md says, and another.
 double normal_error(const PackedMesh& mesh, std::size_t vertex, const glm::dvec3& wanted) {
-  const std::byte* at = mesh.vertices.data() + vertex * mesh.layout.stride +
-                        mesh.layout.attributes[1].offset;
+  const std::byte* at =
+      mesh.vertices.data() + vertex * mesh.layout.stride + mesh.layout.attributes[1].offset;
   glm::dvec3 normal;
   for (int i = 0; i < 3; ++i) {
     normal[i] = (2.0 * static_cast<double>(static_cast<std::int8_t>(at[i])) + 1.0) / 255.0;

@@ -170,7 +170,7 @@ test('the handles lift, size and turn a model', () => {
   near(dragged('tilt1', BEFORE, [340, 102], [295, 57]).turn, [1, -90]);  // its middle is at 295, 102
 });
 
-test('arrow keys move, turn and size by steps, and are told when they rest', () => {
+test('arrow keys move, turn and size by steps, and commit when they rest', () => {
   const pressed = (kind, keys, unit = null) => {
     const { stage, changes } = staged(ABOVE);
     stage.unit = unit;
@@ -238,7 +238,7 @@ test('the eye glides to a look, and stops there', () => {
   for (const { stage, show } of [gliding, half, there]) { delete stage.eye; show(); }
   frames.splice(0).forEach((frame) => frame(0));
   there.stage.orbit(0.32, 0.035 - 0.66);
-  half.stage.orbit(0.32 * 7 / 8, (0.035 - 0.66) * 7 / 8);  // all but the cube of what is left
+  half.stage.orbit(0.32 * 7 / 8, (0.035 - 0.66) * 7 / 8);  // 1 minus the cube of the rest
   frames.length = 0;
   const now = performance.now;
   performance.now = () => 5000;
@@ -278,7 +278,7 @@ test('handles and guides are where the model is', () => {
   assert.deepEqual([places(), drawn.lines.ring], [{}, '']);
 });
 
-test('what is dragged is told while it moves, and pressed models are selected', () => {
+test('a dragged model shows its change, and a pressed one is selected', () => {
   const { stage, drawn, show, changes } = seen();
   show({ tilting: false });
   stage.eye = () => ABOVE;
@@ -330,7 +330,7 @@ test('matrices turn about axes, and turns are read from them', () => {
   near([...low, ...high, ...foot], [0.75, 1.5, 2, 1.25, 2.5, 4, 1, 2, 2]);
 });
 
-test('places on the screen, lines of sight, and what is under a place', () => {
+test('places on the screen, lines of sight, and boxes under a place', () => {
   const { covers, meet, onScreen, sight } = placing;
   near(onScreen(ABOVE, [1, 0.5, 0]), [300, 100]);
   assert.equal(onScreen(ABOVE, [0, 0, 11]), null);

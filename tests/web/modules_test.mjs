@@ -103,7 +103,7 @@ function engineOn(answers = {}) {
   return { engine: new Engine(module, 'plain'), calls, texts, heap: own.HEAPU8 };
 }
 
-test('the engine is asked as a page asks', () => {
+test('calls of the page reach the engine', () => {
   const { engine, calls, heap } = engineOn({ reserve: (bytes) => (bytes > 1000 ? 0 : 256 + bytes), pick: 64, label: 80, bounds: 128 });
   new Uint32Array(heap.buffer, 64, 2).set([7, 9]);
   new Float32Array(heap.buffer, 80, 3).set([1.5, 2.5, 1]);
@@ -204,7 +204,7 @@ test('a turn between two frames is the mean of the readings', async () => {
   assert.equal(gyroscope.turn(1040, 1141), undefined);
   read({ timeStamp: 1140, rotationRate: { alpha: 10, beta: 0, gamma: 0 } });
   near(gyroscope.turn(1040, 1140), [0.1 * 15 * degree, 0, 0]);
-  read({ timeStamp: 6021, rotationRate: { alpha: 0, beta: 0, gamma: 0 } });  // what is older than 5 seconds is forgotten
+  read({ timeStamp: 6021, rotationRate: { alpha: 0, beta: 0, gamma: 0 } });  // older than 5 seconds: forgotten
   assert.equal(gyroscope.turn(1020, 1040), undefined);
   near(gyroscope.turn(1040, 1140), [0.1 * 15 * degree, 0, 0]);
   assert.equal(Gyroscope.of({ srcObject: null }), null);
