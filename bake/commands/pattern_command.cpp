@@ -1,5 +1,6 @@
 // `modar pattern`: rectify, score, simulate and confusion, one after the other.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iterator>
 #include <memory>
@@ -124,6 +125,21 @@ Result<void> take_corners(RectifyCommand& command, const RgbaImage& photo) {
   return {};
 }
 
+/// Warns of sizes that the photo contradicts: typing errors, or both sizes exchanged.
+void print_contradiction(const RectifyCommand& command, const Rectified& done) {
+  // Share that is more than what paper shrinks by or a hand measures wrong. [0.1, 0.3]
+  constexpr double kContradicts = 0.2;
+  const double off = std::abs(std::log(done.aspect.aspect / done.seen.aspect));
+  const double unsure = done.seen.spread / done.seen.aspect;
+  if (done.aspect.spread > 0 || off < kContradicts + 3 * unsure) return;
+  char cause[128];
+  std::snprintf(cause, sizeof cause,
+                "--width by --height is %.3f, but the photo shows %.3f +- %.3f", done.aspect.aspect,
+                done.seen.aspect, done.seen.spread);
+  print_diagnostic({"rectify.sizes", DiagnosticSeverity::kWarning, command.photo, 0, cause,
+                    "measure both sides again; the width is that of the upper edge"});
+}
+
 /// The output, and how well its shape is known.
 void print_rectified(const RectifyCommand& command, const Rectified& done) {
   // The player measures aspects that are off by less as soon as it sees the thing.
@@ -169,6 +185,7 @@ Result<ExitCode> run_rectify(RectifyCommand& command) {
   }
   MODAR_TRY(write_png(done->image, command.output, command.options.width_mm));
   print_rectified(command, *done);
+  print_contradiction(command, *done);
   if (command.json) {
     const Json json = {{"image", command.output},
                        {"width", done->image.width},

@@ -811,8 +811,13 @@ FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found)
   const bool unsharp = found->sharpness < kDoubtfulSharpness && !found->clear();
   const bool part = share < (unsharp ? kLeastShare : kLeastPicture) || !cut.validate();
   if (part) return picture;
-  picture.doubt = "";
-  if (found->fills || (share > kLeastFrontal && is_upright(corners))) return picture;
+  const bool frontal = share > kLeastFrontal && is_upright(corners);
+  // A scan has such edges within it; the photo of a print from straight above has them around it.
+  if (found->fills || !frontal || !found->clear()) picture.doubt = "";
+  if (found->fills || frontal) {
+    if (*picture.doubt != 0) picture.doubt = "upright";
+    return picture;
+  }
   picture.doubt = found->doubt();
   picture.corners = found->corners;
   for (PixelPoint& corner : *picture.corners) {
@@ -825,8 +830,10 @@ std::string_view doubt_words(std::string_view doubt) {
   if (doubt == "rivalled") return "there are several flat objects in the photo";
   return doubt == "blurred"  ? "an edge is hidden or blurred"
          : doubt == "framed" ? "there are edges around or beyond them, perhaps those of the sheet"
-         : doubt == "fills"  ? "they fill the photo, which may already be the picture"
-                             : "no edges of a flat object stand out";
+         : doubt == "upright"
+             ? "edges parallel to the photo's stand out, perhaps those of the picture"
+         : doubt == "fills" ? "they fill the photo, which may already be the picture"
+                            : "no edges of a flat object stand out";
 }
 
 Result<RgbaImage> corners_picture(const RgbaImage& photo,

@@ -93,8 +93,8 @@ Result<Rectified> rectify(const RgbaImage& photo, const RectifyOptions& options)
   const auto& c = options.corners;
   const bool measured = options.width_mm > 0 && options.height_mm > 0;
   Rectified out;
-  out.aspect = measured ? AspectEstimate{options.width_mm / options.height_mm, 0}
-                        : estimate_aspect(c, photo.width, photo.height, options.focal_px);
+  out.seen = estimate_aspect(c, photo.width, photo.height, options.focal_px);
+  out.aspect = measured ? AspectEstimate{options.width_mm / options.height_mm, 0} : out.seen;
   const double aspect = out.aspect.aspect;
   const double photo_longest =
       std::max({length(c[0], c[1]), length(c[1], c[2]), length(c[2], c[3]), length(c[3], c[0])});

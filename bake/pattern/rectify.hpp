@@ -24,6 +24,7 @@ struct RectifyOptions {
 struct Rectified {
   RgbaImage image;
   AspectEstimate aspect;  ///< that the image was made with; spread 0 where both sizes are known
+  AspectEstimate seen;    ///< by the perspective alone
 };
 
 /// A frontal view of the quadrilateral. Its aspect ratio is that of the sizes in mm where both are

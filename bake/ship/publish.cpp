@@ -105,6 +105,11 @@ std::string name_of(const std::string& path) {
 Result<void> check_bundles(const PublishRequest& request) {
   std::set<std::string> names;
   for (const std::string& path : request.bundles) {
+    if (!is_plain_name(name_of(path))) {
+      return fail(ExitCode::kUsage, "ship.name", path,
+                  "a release names bundles with A-Z a-z 0-9 . _ - only, up to 100 of them",
+                  "rename the file");
+    }
     if (!names.insert(lower_case(name_of(path))).second) {
       return fail(ExitCode::kInvalidInput, "ship.name", path,
                   "two bundles have this name, or names that differ by case only",

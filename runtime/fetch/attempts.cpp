@@ -113,7 +113,9 @@ Outcome Attempts::classify(Transfer& transfer, const Answer& answer) {
         return again(transfer, "the server has no such file");
       }
       transfer.error = {kExitMixed, "fetch.missing", address_of(transfer),
-                        "the server has no such file", "publish the release again, whole"};
+                        "the server has no such file",
+                        transfer.object == nullptr ? "check the address, or publish a release there"
+                                                   : "publish the release again, whole"};
       return Outcome::kFailed;
     case Answer::Kind::kNoRange:
       discard(transfer);

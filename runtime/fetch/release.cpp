@@ -334,16 +334,6 @@ class Members {
   std::string missing_;
 };
 
-/// A file name that is valid on every file system and cannot leave its folder.
-bool is_plain_name(std::string_view name) {
-  if (name.empty() || name.size() > 100 || name.front() == '.') return false;
-  for (const char c : name) {
-    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-    if (!letter && c != '.' && c != '_' && c != '-') return false;
-  }
-  return true;
-}
-
 Result<ReleaseBundle> read_bundle(const rapidjson::Value& json) {
   Members members(json);
   ReleaseBundle bundle;
@@ -483,6 +473,15 @@ std::string release_text(const Release& release) {
     for (const ReleaseBundle& bundle : release.bundles) write_bundle(json, bundle);
     json.EndArray();
   });
+}
+
+bool is_plain_name(std::string_view name) {
+  if (name.empty() || name.size() > 100 || name.front() == '.') return false;
+  for (const char c : name) {
+    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    if (!letter && c != '.' && c != '_' && c != '-') return false;
+  }
+  return true;
 }
 
 std::string lower_case(std::string_view name) {

@@ -361,6 +361,10 @@ Result<std::unique_ptr<FrameSource>> open_file(const std::string& path) {
 Result<std::unique_ptr<FrameSource>> open_path(const std::string& input) {
   try {
     silence_opencv();
+    if (input.find("://") != input.npos) {
+      return fail(ExitCode::kIo, "input.open", input, "this is an address, not a file",
+                  "download it first, and pass the file");
+    }
     struct stat status {};
     if (stat(input.c_str(), &status) != 0) {
       return fail(ExitCode::kIo, "input.open", input, "there is no such file or folder",

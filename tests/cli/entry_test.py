@@ -69,6 +69,17 @@ class SameFiles(ProgramTest):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual((self.place / "out/museum.modar").read_bytes(), (self.folder / "files.modar").read_bytes())
 
+    def test_a_print_from_straight_above_is_doubted(self):
+        for size, words in (((640, 480), True), ((640, 440), False)):  # the shape of a camera's photos, and another
+            sheet = Canvas(*size, (190, 180, 160), 2)
+            sheet.box(110, 40, 530, 400, (40, 60, 120))
+            for i in range(40):
+                sheet.box(130 + i * 67 % 360, 60 + i * 91 % 300, 150 + i * 67 % 360, 76 + i * 91 % 300, (220, 40 + 5 * i, 40))
+            png.write(self.place / "sheet.png", sheet.picture(), 6)
+            done = self.modar("bake", "sheet.png", "-o", "a.modar", *QUICK, cwd=self.place)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual("pattern.doubtful" in done.stderr, words, done.stderr)
+
     def test_the_whole_file_is_taken_where_that_is_asked(self):
         photo(self.place / "card.png")
         sizes = []

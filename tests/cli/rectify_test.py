@@ -35,6 +35,13 @@ class Rectify(ProgramTest):
         measured = self.rectify("10,10,300,160,310,500,20,650", "--width", "200mm", "--height", "300mm")
         self.assertNotIn("rectify.aspect", measured.stderr)
 
+    def test_sizes_that_the_photo_contradicts_are_doubted(self):
+        frontal = "40,30,300,30,300,600,40,600"  # 260 to 570
+        for height, doubted in (("210mm", True), ("438mm", False), ("360mm", False), ("330mm", True)):
+            done = self.rectify(frontal, "--width", "200mm", "--height", height)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual("rectify.sizes" in done.stderr, doubted, f"{height}: {done.stderr}")
+
     def test_the_width_travels_with_the_image(self):
         self.assertEqual(self.rectify("10,10,300,40,310,600,20,650", "--width", "200mm").returncode, 0)
         bundle = self.folder / "b.modar"

@@ -94,7 +94,7 @@ class RealServer(ShipTest):
 
     def test_errors_that_last_are_told(self):
         self.assert_fails(self.fetch(self.nginx.url("broken"), "--attempts", "2"), 16, "fetch.network", "500")
-        self.assert_fails(self.fetch(self.nginx.url("nothing")), 13, "fetch.missing")
+        self.assert_fails(self.fetch(self.nginx.url("nothing")), 13, "fetch.missing", "check the address")
         self.nginx.stop()
         self.assert_fails(self.fetch(self.nginx.url(), "--attempts", "2"), 16, "fetch.network", "again")
         done = self.fetch(self.nginx.url(), "--attempts", "4")  # waits 0.5, 1 and 2 s

@@ -268,6 +268,18 @@ class Publish(ShipTest):
         self.assert_fails(done, 13, "fetch.too-long", "8388608")
         self.assertNotIn("attempt", done.stderr)
 
+    def test_names_that_no_release_takes_are_refused_before_a_folder_is_made(self):
+        for name in ("ärger 1", "a" * 101):
+            other = self.folder / f"{name}.modar"
+            shutil.copy(self.shop.old, other)
+            done = self.modar("ship", "publish", other, "--to", self.folder / "new", "--key", self.shop.key)
+            self.assert_fails(done, 1, "ship.name", "rename the file")
+            self.assertFalse((self.folder / "new").exists())
+        longest = self.folder / ("a" * 100 + ".modar")
+        shutil.copy(self.shop.old, longest)
+        done = self.modar("ship", "publish", longest, "--to", self.folder / "new", "--key", self.shop.key)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
     def test_names_that_differ_by_case_only_are_refused(self):
         other = self.folder / "Museum.modar"
         shutil.copy(self.shop.old, other)

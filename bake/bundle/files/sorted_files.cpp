@@ -159,7 +159,7 @@ Result<void> find_picture(PatternRequest& pattern, std::vector<Diagnostic>& said
     if (!is_pattern_size(width, height)) {
       return fail(ExitCode::kInvalidInput, "pattern.loop-size", pattern.path,
                   "the picture has " + std::to_string(width) + "x" + std::to_string(height) +
-                      " pixels, and each side needs 32 to 1023",
+                      " pixels where its longer side has at most 720, and 32 are needed",
                   "give a larger picture, or crop it closer to a square");
     }
   }

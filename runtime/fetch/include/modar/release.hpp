@@ -140,6 +140,9 @@ struct Release {
 };
 inline constexpr std::int64_t kNever = 0;
 
+/// A file name that is valid on every file system and cannot leave its folder: 1 to 100 of
+/// A-Z a-z 0-9 . _ -, the first no point.
+bool is_plain_name(std::string_view name);
 /// A bundle's name as case-insensitive file systems compare it.
 std::string lower_case(std::string_view name);
 
