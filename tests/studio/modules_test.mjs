@@ -43,7 +43,7 @@ const define = (name, value) => Object.defineProperty(globalThis, name, { value,
 const m = Object.assign((tag, ...rest) => ({ tag, rest }), { redraw() {}, mount: (_, component) => { shown = component; } });
 for (const [name, value] of Object.entries({
   m, Element, MediaStream, window: globalThis, HTMLElement: Element, HTMLVideoElement: Element, HTMLCanvasElement: Element, HTMLImageElement: Element,
-  ResizeObserver: class { observe() {} }, IntersectionObserver: class { observe() {} }, EventSource: EventTarget, location: { hash: '#/files', search: '' }, navigator: { languages: ['en'] },
+  ResizeObserver: class { observe() {} disconnect() {} }, IntersectionObserver: class { observe() {} }, EventSource: EventTarget, location: { hash: '#/files', search: '' }, navigator: { languages: ['en'] },
   document: { documentElement: {}, body: new Element() }, addEventListener() {}, requestAnimationFrame: () => 1, cancelAnimationFrame() {},
   fetch: async (address, { method = 'GET', body } = {}) => {
     if (address.startsWith('words/')) return new Response('{}');
@@ -293,6 +293,8 @@ test('a dragged model shows its change, and a pressed one is selected', () => {
   assert.equal(drawn.tip.textContent, '-1,0,0');
   assert.deepEqual([drawn.tip.hidden, drawn.tip.style], [false, { left: '200px', top: '59px' }].map((each, i) => (i ? drawn.tip.style : each)));
   assert.equal(drawn.lines.snap, 'M200.0 250.0L200.0 50.0');
+  stage.dom.onpointermove(event('pointermove', [250, 147]));
+  assert.equal(drawn.lines.snap, 'M100.0 150.0L300.0 150.0');
   stage.dom.onpointercancel(event('pointercancel', [204, 100]));
   assert.deepEqual([selected, changes], [[], []]);
   stage.selected = null;
@@ -396,4 +398,118 @@ test('another bake closes the player before, and its camera with the last one al
   }
   screen.onremove();
   assert.deepEqual([open.size, camera.stopped], [0, 1]);
+});
+
+test('numbers are typed, or stepped with keys, within their limits', async () => {
+  const { NumberField, LengthField, choice } = await module('parts.js');
+  const { settings } = await module('words.js');
+  const told = [];
+  const field = (attrs) => {
+    const vnode = { attrs: { id: 'x', label: 'X', value: 5, onvalue: (value) => told.push(value), ...attrs }, state: {} };
+    NumberField.oninit(vnode);
+    const input = () => found(NumberField.view(vnode), 'input')[0].rest[0];
+    return { input, type: (value) => { input().oninput({ target: { value } }); input().onchange(); },
+      key: (key, shiftKey = false) => input().onkeydown({ key, shiftKey, preventDefault() {} }), rest: () => { clearTimeout(vnode.state.timer); input().onchange(); } };
+  };
+  const plain = field({});
+  assert.equal(plain.input().value, '5');
+  plain.type('7.256');
+  plain.type('7,25');
+  plain.type('5');  // as before
+  plain.type('x');
+  plain.input().oninput({ target: { value: '9' } });
+  plain.key('Escape');
+  plain.input().onchange();
+  assert.deepEqual(told.splice(0), [7.26, 7.25]);
+  for (const [key, shift, value] of [['ArrowUp', false, 6], ['ArrowDown', true, -5], ['PageUp', false, 15], ['PageDown', false, -5]]) {
+    const stepped = field({});
+    stepped.key(key, shift);
+    assert.equal(told.length, 0);
+    stepped.rest();
+    assert.deepEqual(told.splice(0), [value], key);
+  }
+  const limited = field({ least: 4, most: 6 });
+  for (const value of ['3.9', '6.1', '4.5']) limited.type(value);
+  assert.deepEqual(told.splice(0), [4, 6, 4.5]);
+  field({ empty: true }).type('');
+  field({}).type('');
+  assert.deepEqual(told.splice(0), [null]);
+  settings.unit = 'cm';
+  const { rest: [{ value, step, least, most, unit, onvalue }] } = LengthField.view({ attrs: { value: 123.4, least: 10, most: 50, onvalue: (mm) => told.push(mm) } });
+  assert.deepEqual([value, step, least, most, unit], [12.34, 0.1, 1, 5, 'cm']);
+  onvalue(2);
+  assert.deepEqual(told.splice(0), [20]);
+  const drawn = choice('kind', 'Kind', [['a', 'A'], ['b', 'B']], 'b', (chosen) => told.push(chosen));
+  const radios = found(drawn, 'input').map(({ rest: [attributes] }) => attributes);
+  assert.deepEqual(radios.map(({ checked, value: of }) => [of, checked]), [['a', false], ['b', true]]);
+  radios[0].onchange();
+  assert.deepEqual(told, ['a']);
+});
+
+test('what the server refuses is an error with its words', async () => {
+  const { ask, askJson, Newest, pathOf, Refused, thumb } = await module('api.js');
+  const fetched = globalThis.fetch;
+  const calls = [];
+  let answer = () => new Response('{"a": 1}');
+  globalThis.fetch = async (address, options) => { calls.push([address, options]); return answer(); };
+  assert.deepEqual(await askJson('POST', 'edit', { b: 2 }), { a: 1 });
+  const [[address, { method, headers, body }]] = calls;
+  assert.deepEqual([address, method, headers, body], ['api/edit', 'POST', { 'Content-Type': 'application/json' }, '{"b":2}']);
+  await ask('GET', 'project');
+  await ask('PUT', 'file', new Blob(['c']));
+  assert.deepEqual(calls.slice(1).map(([, options]) => [options.headers, options.body instanceof Blob]), [[{}, false], [{}, true]]);
+  const refusal = () => ask('GET', 'project').then(() => null, (error) => error);
+  answer = () => new Response('{"error": "no", "cure": "do", "line": 3}', { status: 409 });
+  const refused = await refusal();
+  assert.ok(refused instanceof Refused);
+  assert.deepEqual([refused.message, refused.cure, refused.line, refused.file, refused.code, refused.status], ['no', 'do', 3, '', '', 409]);
+  answer = () => new Response('?', { status: 500, statusText: 'Oops' });
+  const { message, cure } = await refusal();
+  assert.deepEqual([message, cure], ['500 Oops', '']);
+  answer = () => { throw new TypeError(); };
+  assert.deepEqual((({ message: text, status }) => [text, status])(await refusal()), ['gone', 0]);
+  answer = () => { throw Object.assign(new Error(), { name: 'AbortError' }); };
+  assert.equal((await refusal()).name, 'AbortError');
+  globalThis.fetch = fetched;
+  assert.deepEqual([pathOf('a b/c?d'), thumb('a b.png', 96)], ['a%20b/c%3Fd', 'api/thumb/a%20b.png?size=96']);
+  // Of three requests during one, the last is done.
+  const done = [];
+  const newest = new Newest(async (input) => { done.push(input); await settled(); });
+  await Promise.all([1, 2, 3].map((input) => newest.ask(input)));
+  await newest.ask(4);
+  assert.deepEqual(done, [1, 3, 4]);
+});
+
+test('a scene\'s words, sides and changes', async () => {
+  const { Scene } = await module('scene.js');
+  const { settings } = await module('words.js');
+  settings.unit = 'cm';
+  const scene = { pattern: 'cover', model: 'pot', name: 'pot', offset: [10, 20, 0], offset_unit: 'mm', turn: [0, 0, 30], size: { kind: 'height', value: 50 }, up: null,
+    centred: false, texts: {}, alts: {} };
+  const pattern = { ...PATTERN, width_mm: 100 };
+  state.project = { ...project, patterns: [pattern], models: [{ name: 'pot', size: [1, 2, 1], up: 'y' }], scenes: [scene] };
+  answers['api/edit'] = state.project;
+  const screen = new Scene({ attrs: { pattern } });
+  screen.picture = { width: 200, height: 100 };
+  assert.equal(screen.unit, 50);  // the longer side, 100 mm, is two units
+  assert.deepEqual([{ move: [0.1, -0.2, 0] }, { move: [0, 0, 0.3] }, { size: 1.5 }, { turn: [2, 44.6] }].map((change) => screen.wordsOf(change)),
+    ['0.5 cm · -1 cm', '1.5 cm', '150 %', '45°']);
+  assert.equal(screen.wordsOf(null), '');
+  const sides = [];
+  for (let up = null; sides.length < 6; sides.push(up)) up = screen.nextSide({ up, asset: { up: 'y' } });
+  assert.deepEqual([new Set(sides).size, sides.at(-1)], [6, null]);
+  const [placed] = screen.scenes();
+  asked.length = 0;
+  screen.oncreate({ dom: Object.assign(new Element(), { querySelector: () => new Element() }), attrs: { pattern } });
+  const change = async (by) => { await screen.stage.told.change(placed, by); await settled(); return edits().map(({ key, value }) => [key, value]); };
+  assert.deepEqual(await change({ move: [0.1, -0.2, 0] }), [['offset', [15, 10, 0]]]);
+  assert.deepEqual(await change({ turn: [2, 15] }), [['turn', 45]]);
+  assert.deepEqual(await change({ size: 1.5 }), [['height', '75mm']]);
+  const number = (drawn) => drawn.rest[0];
+  await number(screen.turnField(placed, 0)).onvalue(9);
+  await settled();
+  assert.deepEqual(edits().map(({ key, value }) => [key, value]), [['turn', [9, 0, 30]]]);
+  assert.deepEqual([number(screen.sizeField(placed)).value, number(screen.turnField(placed, 2)).value], [50, 30]);
+  screen.onremove();
+  state.project = project;
 });

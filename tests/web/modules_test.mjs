@@ -158,6 +158,7 @@ test('a bundle arrives in the engine in parts', () => {
   assert.deepEqual([...engine.decode(1, Uint8Array.of(1), 3)], [6, 7, 8]);
   assert.deepEqual([...engine.mediaOf(0)], [6, 7]);
   engine.addPattern(Uint8Array.of(1, 2, 3), { name: 'own' });
+  assert.deepEqual([...heap.subarray(2000, 2003)], [1, 2, 3]);
   assert.deepEqual([engine.stand({ name: 'stands' }, 1), engine.stand({ name: 'not' }, 2)], [true, false]);
   assert.deepEqual(engine.patterns.map(({ name }) => name), ['cover', 'map', 'own', 'stands']);
   engine.forgetPatterns(2);
