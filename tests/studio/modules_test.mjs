@@ -54,6 +54,7 @@ for (const [name, value] of Object.entries({
 
 const PATTERN = { name: 'cover', file: 'cover.png', kind: 'flat', sides: {}, corners: null, width_mm: null, height_mm: null };
 const project = { revision: '1', patterns: [PATTERN], models: [], scenes: [], problems: [], bundle: {}, languages: ['en'], phone: null };
+const BAKED = { baked: true, stale: false };
 const module = (name) => import(pathToFileURL(path.join(folder, name)));
 const [{ Picture }, placing, { Stage }, { sideName, surfaceOf }, { state }, { Try }] =
   await Promise.all(['picture', 'placing', 'stage', 'surface', 'state', 'try'].map((name) => module(`${name}.js`)));
@@ -487,7 +488,7 @@ test('a scene\'s words, sides and changes', async () => {
   const scene = { pattern: 'cover', model: 'pot', name: 'pot', offset: [10, 20, 0], offset_unit: 'mm', turn: [0, 0, 30], size: { kind: 'height', value: 50 }, up: null,
     centred: false, texts: {}, alts: {} };
   const pattern = { ...PATTERN, width_mm: 100 };
-  state.project = { ...project, patterns: [pattern], models: [{ name: 'pot', size: [1, 2, 1], up: 'y' }], scenes: [scene] };
+  state.project = { ...project, bundle: BAKED, patterns: [pattern], models: [{ name: 'pot', size: [1, 2, 1], up: 'y' }], scenes: [scene] };
   answers['api/edit'] = state.project;
   const screen = new Scene({ attrs: { pattern } });
   screen.picture = { width: 200, height: 100 };
@@ -512,4 +513,147 @@ test('a scene\'s words, sides and changes', async () => {
   assert.deepEqual([number(screen.sizeField(placed)).value, number(screen.turnField(placed, 2)).value], [50, 30]);
   screen.onremove();
   state.project = project;
+});
+
+test('words of a language: plurals, names in quotations, numbers and sizes', async () => {
+  const { bytes, firstLanguage, languageName, length, number, numberIn, said, sentence, settings, t, told, typed, useLanguage } = await module('words.js');
+  const fetched = globalThis.fetch;
+  globalThis.fetch = async () => new Response(JSON.stringify({ files: '{n} files in {where}', files_one: 'a file in {where}', 'error.image.decode': ['{q} is broken', 'save  it'],
+    'error.image': ['a picture', 'another'], known: 'bekannt' }));
+  const spoken = document.documentElement.lang;
+  await useLanguage('de');
+  assert.equal(document.documentElement.lang, 'de');
+  assert.deepEqual([1, 2, 1234.567].map((n) => t('files', { n, where: 'x' })), ['a file in x', '2 files in x', '1.234,57 files in x']);
+  assert.deepEqual([t('nothing'), t('files', { n: 2 })], ['nothing', '2 files in {where}']);
+  assert.deepEqual([number(1234.5), typed(1234.5678)], ['1.234,5', '1234,5678']);
+  assert.deepEqual(['1.234', '1,234', '1.5', '-2.000', '1.234,5', '1.234.567', '1,234.5', '', 'x', '0.250', '1234.500', '\u22123'].map(numberIn),
+    [1234, 1.234, 1.5, -2000, 1234.5, 1234567, 1234.5, null, null, 0.25, 1234.5, -3]);
+  assert.deepEqual(said({ code: 'image.decode', error: "'a.png' ends" }), { text: 'a.png is broken', cure: 'save it' });
+  assert.deepEqual(said({ code: 'image.size', message: 'too large' }), { text: 'a picture', cure: 'another', detail: 'too large' });
+  assert.deepEqual(said({ error: 'odd', cure: 'do' }), { text: 'odd', cure: 'do', lang: 'en' });
+  assert.deepEqual([told('known', 'x'), told('other', 'x')], [{ text: 'bekannt' }, { text: 'x', lang: 'en' }]);
+  assert.deepEqual(['it is odd', 'a.png is odd', 'Odd'].map(sentence), ['It is odd', 'a.png is odd', 'Odd']);
+  assert.deepEqual([999, 1000, 999_999, 1e6, 12_345_678].map(bytes), ['999 B', '1 KB', '1.000 KB', '1 MB', '12,3 MB']);
+  assert.deepEqual([languageName('en'), languageName('?')], ['Englisch', '?']);
+  settings.unit = 'in';
+  assert.equal(length(25.4 * 2.127), '2,13 in');
+  settings.unit = 'mm';
+  assert.equal(length(12.34), '12,3 mm');
+  settings.unit = 'cm';
+  for (const [search, languages, first] of [['?lang=de', ['en'], 'de'], ['', ['fr', 'de-AT', 'en'], 'de'], ['?lang=fr', ['pl'], 'en']]) {
+    Object.assign(location, { search });
+    navigator.languages = languages;
+    assert.equal(firstLanguage(), first);
+  }
+  Object.assign(location, { search: '' });
+  globalThis.fetch = async () => new Response('{}');
+  await useLanguage('en');
+  document.documentElement.lang = spoken;
+  globalThis.fetch = fetched;
+});
+
+test('changes wait for one another, and are made again where the file has changed', async () => {
+  const { addFiles, addScene, deleteScene, loadRivals, loadScore, modelOf, patternOf, scenesOf, setPattern, setScene, undo } = await module('state.js');
+  const fetched = globalThis.fetch;
+  const calls = [];
+  const scene = (index, model, offset = [0, 0, 0]) => ({ index, pattern: 'cover', model, offset });
+  let now = { ...project, bundle: BAKED, models: [{ name: 'pot', missing: [] }, { name: 'lid', missing: [] }], scenes: [scene(0, 'pot'), scene(null, 'lid')] };
+  state.project = now;
+  assert.deepEqual([modelOf('lid').name, modelOf('x'), patternOf('cover').name, scenesOf('cover').length, scenesOf('x').length], ['lid', undefined, 'cover', 2, 0]);
+  let refusals = 0;
+  globalThis.fetch = async (address, { method = 'GET', body } = {}) => {
+    const sent = typeof body === 'string' ? JSON.parse(body) : body;
+    calls.push([`${method} ${address}`, ...(sent?.edits ?? [])]);
+    if (address === 'api/edit' && refusals-- > 0) return new Response('{"error": "changed"}', { status: 409 });
+    if (address.startsWith('api/files')) return new Response('{"added": ["a"]}');
+    if (address.startsWith('api/score')) return new Response('{"grade": "B"}');
+    if (address.startsWith('api/rivals')) return new Response('{"rivals": [{"name": "map"}]}');
+    return new Response(JSON.stringify(now));
+  };
+  const made = () => calls.splice(0);
+  await setScene(now.scenes[0], { offset: [1, 2, 3], up: null });
+  assert.deepEqual(made(), [['POST api/edit', { op: 'set', table: 'scene', index: 0, key: 'offset', value: [1, 2, 3] }, { op: 'remove', table: 'scene', index: 0, key: 'up' }]]);
+  await setScene(now.scenes[1], () => ({ name: 'top' }));
+  assert.deepEqual(made(), [['POST api/edit', { op: 'set', table: 'scene', pattern: 'cover', model: 'lid', key: 'name', value: 'top' }]]);
+  await setPattern('cover', { width: '5mm' });
+  await addScene('cover', 'lid');
+  await deleteScene(now.scenes[0]);
+  await undo();
+  assert.deepEqual(made(), [['POST api/edit', { op: 'set', table: 'pattern', name: 'cover', key: 'width', value: '5mm' }],
+    ['POST api/edit', { op: 'add', table: 'scene', value: { pattern: 'cover', model: 'lid' } }], ['POST api/edit', { op: 'delete', table: 'scene', index: 0 }], ['POST api/undo']]);
+  refusals = 1;
+  await deleteScene(now.scenes[0]);
+  assert.deepEqual(made().map(([call]) => call), ['POST api/edit', 'GET api/project', 'POST api/edit']);
+  // Another scene has this index meanwhile.
+  refusals = 1;
+  now = { ...now, scenes: [scene(0, 'lid')] };
+  await deleteScene(scene(0, 'pot'));
+  assert.deepEqual([made().map(([call]) => call), state.notice.text, state.notice.bad], [['POST api/edit', 'GET api/project'], 'changed', true]);
+  state.notice = null;
+  const seenFiles = [];
+  const told = await addFiles([{ name: 'a b.png', blob: new Blob(['x']) }, { name: 'big', blob: { size: 2 ** 31 + 1 } }], (...at) => seenFiles.push(at));
+  assert.deepEqual(made().map(([call]) => call), ['PUT api/files/a%20b.png', 'GET api/project']);
+  assert.deepEqual([told[0], told[1].problems.length, seenFiles], [{ name: 'a b.png', added: ['a'] }, 1, [[0, 2, 'a b.png'], [1, 2, 'big'], [2, 2, '']]]);
+  await loadScore('cover');
+  assert.deepEqual([state.scores.get('cover'), made()], [{ grade: 'B' }, [['GET api/score?pattern=cover']]]);
+  await loadRivals('cover');
+  assert.deepEqual([state.rivals.get('cover'), made()], [{ found: [] }, []]);  // it is alone
+  state.rivals.clear();
+  state.project = { ...now, patterns: [PATTERN, { ...PATTERN, name: 'map' }] };
+  await loadRivals('cover');
+  assert.deepEqual([state.rivals.get('cover'), made()], [{ found: [{ name: 'map' }] }, [['GET api/rivals?pattern=cover']]]);
+  globalThis.fetch = fetched;
+  state.project = project;
+});
+
+test('events of the server', async () => {
+  const { bundleBytes, isBaking, listen } = await module('state.js');
+  const fetched = globalThis.fetch;
+  const calls = [];
+  const baked = { ...project, revision: '2', bundle: BAKED };
+  globalThis.fetch = async (address, { method = 'GET' } = {}) => { calls.push(`${method} ${address}`); return new Response(JSON.stringify(baked)); };
+  let events;
+  define('EventSource', class extends EventTarget { constructor(address) { super(); events = this; this.address = address; } });
+  listen();
+  assert.equal(events.address, 'api/events');
+  const sent = async (type, data) => {
+    events.dispatchEvent(Object.assign(new Event(type), { data: data && JSON.stringify(data) }));
+    await settled();
+    return calls.splice(0);
+  };
+  state.baked = 0;
+  await sent('progress', { kind: 'bake', stage: 'mesh', done: 0.5 });
+  assert.deepEqual([state.progress.done, isBaking()], [0.5, true]);
+  assert.deepEqual(await sent('baked', {}), ['GET api/project']);
+  assert.deepEqual([state.progress, state.failure, state.baked, isBaking()], [null, null, 1, false]);
+  assert.deepEqual(await sent('project', { revision: '2' }), []);  // what the page has
+  assert.deepEqual(await sent('project', { revision: '3' }), ['GET api/project']);
+  assert.deepEqual(await sent('project', { revision: '2', files: true }), ['GET api/project']);
+  await sent('baked', { errors: [{ code: 'mesh.open', error: 'open' }] });
+  assert.deepEqual([state.failure.kind, state.failure.code, state.failure.errors.length], ['bake', 'mesh.open', 1]);
+  await sent('project', { revision: '3' });
+  assert.equal(state.failure, null);
+  await sent('failed', { kind: 'bake', code: 'project.changing' });
+  assert.equal(state.failure, null);  // made again
+  assert.deepEqual(await sent('failed', { kind: 'export', code: 'io' }), []);
+  assert.equal(state.failure.code, 'io');
+  state.failure = null;
+  await sent('exported', { kind: 'page', path: 'out', url: 'u' });
+  assert.deepEqual(state.exported.get('page'), { path: 'out', url: 'u' });
+  await sent('shown');
+  assert.equal(state.baked, 3);
+  const [one, two] = [bundleBytes(), bundleBytes()];
+  assert.equal(one, two);
+  ++state.baked;
+  assert.notEqual(bundleBytes(), one);
+  await settled();
+  assert.deepEqual(calls.splice(0), ['GET api/bundle', 'GET api/bundle']);
+  events.onerror();
+  assert.equal(state.gone, true);
+  events.onopen();
+  events.onopen();
+  await settled();
+  assert.deepEqual([state.gone, calls.splice(0)], [false, ['GET api/project']]);
+  Object.assign(state, { project, baked: 0 });
+  globalThis.fetch = fetched;
 });
