@@ -21,6 +21,9 @@ TEST(HumanBytes, ThreeDigits) {
 TEST(TimeLeft, ComesFromThePartThatIsDone) {
   EXPECT_EQ(time_left(0.25, 10), ", about 30 s left");
   EXPECT_EQ(time_left(0.5, 600), ", about 10 min left");
+  EXPECT_EQ(time_left(0.5, 99), ", about 99 s left");
+  EXPECT_EQ(time_left(0.5, 100), ", about 2 min left");
+  EXPECT_EQ(time_left(0.5, 5), ", about 5 s left");
   EXPECT_EQ(time_left(0.5, 4.9), "");  // too early to tell
   EXPECT_EQ(time_left(0, 60), "");
   EXPECT_EQ(time_left(1, 60), "");
