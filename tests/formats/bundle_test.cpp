@@ -396,6 +396,22 @@ TEST(Bundle, ThePreviewNeedsTwoStagesAndIsAGoodBundle) {
   EXPECT_EQ(report(got), std::vector<std::string>{"good"});
 }
 
+TEST(Bundle, AnOnlyLevelIsShownHoweverLarge) {
+  BundleContent content = staged_content();
+  content.texture_levels.resize(1);
+  content.textures[0].level_count = 1;
+  const TextureLevelRecord level = content.texture_levels[0];
+  content.texture_data[0].resize(level.size * 2);
+  const Bytes bytes = encode(content);
+  const auto view = BundleView::open(bytes);
+  ASSERT_TRUE(view) << to_line(view.error());
+  const std::vector<StageRange> shown = shown_blocks(*view, 0);
+  ASSERT_EQ(shown.size(), 2u) << "colours and their twin";
+  EXPECT_EQ(shown[0].size, level.size);
+  EXPECT_EQ(shown_blocks(*BundleView::open(encode(staged_content())), 0).size(), 2u * 9)
+      << "256 down to 1";
+}
+
 TEST(Bundle, OpensWithoutTwinsThatTheTableHides) {
   BundleContent content = staged_content();
   ExtraSection record;
