@@ -325,6 +325,16 @@ TEST_F(Gltf, VersionOneIsRefusedAsSuch) {
   EXPECT_EQ(binary.error().code, "gltf.version");
 }
 
+TEST_F(Gltf, AGlbThatIsCutShortIsCalledSo) {
+  for (const std::uint32_t stated : {20U, 21U}) {
+    std::ofstream(folder_ / "cut.glb", std::ios::binary)
+        << "glTF" << raw<std::uint32_t>({2, stated, 0, 0x4E4F534A});
+    const auto read = read_gltf((folder_ / "cut.glb").string());
+    ASSERT_FALSE(read);
+    EXPECT_EQ(read.error().code == "gltf.short", stated == 21) << to_line(read.error());
+  }
+}
+
 TEST_F(Gltf, ImageNamesArePercentDecodedAndMayBeWebp) {
   std::ofstream(folder_ / "my wall.webp") << "RIFF";
   std::ofstream(folder_ / "100%.png") << "png";

@@ -129,6 +129,8 @@ TEST(Stl, RefusesWhatIsNone) {
   ASSERT_FALSE(short_file);
   EXPECT_EQ(short_file.error().code, "stl.short");
   EXPECT_EQ(short_file.error().where, "dir/a.stl: byte 80");
+  cut.replace(0, 6, "solid ");  // as headers of binary files begin, too
+  EXPECT_EQ(parse_stl(cut, "a.stl").error().code, "stl.short");
   std::string many = binary_stl(roof(90));
   many[83] = '\xFF';  // four thousand million triangles
   EXPECT_EQ(parse_stl(many, "a.stl").error().code, "stl.short");

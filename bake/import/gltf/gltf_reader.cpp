@@ -459,10 +459,24 @@ bool read_buffer(std::vector<unsigned char>* bytes, std::string* error, const st
   return true;
 }
 
+/// Errors: kInvalidInput "gltf.short" where a GLB states more bytes than it has.
+Result<void> require_whole(std::string_view bytes, const std::string& path) {
+  constexpr std::size_t kLengthAt = 8;
+  std::uint32_t stated = 0;
+  if (!bytes.starts_with("glTF") || bytes.size() < kLengthAt + sizeof stated) return {};
+  std::memcpy(&stated, bytes.data() + kLengthAt, sizeof stated);
+  if (stated <= bytes.size()) return {};
+  return fail(ExitCode::kInvalidInput, "gltf.short", path + ": byte 8",
+              "the file states " + std::to_string(stated) + " bytes and has " +
+                  std::to_string(bytes.size()),
+              "the file is truncated; copy or export it again");
+}
+
 }  // namespace
 
 Result<SourceModel> read_gltf(const std::string& path, const ReadOptions& options) {
   MODAR_ASSIGN(std::string bytes, read_file(path, kMaxFileBytes));
+  MODAR_TRY(require_whole(bytes, path));
   const std::string parent = std::filesystem::path(path).parent_path().string();
   ModelFolder place((parent.empty() ? "." : parent) + "/", options.within);
   const std::string& folder = place.path;

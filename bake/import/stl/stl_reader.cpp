@@ -207,10 +207,9 @@ std::optional<std::uint64_t> binary_count(std::string_view bytes) {
   const std::uint64_t needed = kHeaderBytes + std::uint64_t{count} * kFacetBytes;
   // Binary files whose header begins with "solid" are common: their size shows what they are. Some
   // programs write a few bytes behind the facets; a text has no zeros there.
-  const bool fits = needed == bytes.size() ||
-                    (needed < bytes.size() && bytes.find('\0') != std::string_view::npos);
+  const bool zeros = bytes.find('\0') != std::string_view::npos;
   std::string_view start = bytes.substr(0, 80);
-  if (!fits && same_word(next_word(start), "solid")) return std::nullopt;
+  if (needed != bytes.size() && !zeros && same_word(next_word(start), "solid")) return std::nullopt;
   return count;
 }
 
