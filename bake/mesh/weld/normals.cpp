@@ -443,10 +443,11 @@ class NormalMaker {
     }
   }
   void copy_position(std::uint32_t p) {
-    if (source_.uvs.size() > source_.positions.size()) source_.uvs.resize(source_.positions.size());
+    const bool own_uvs = source_.corner_uvs.kind == IndexPlane::Kind::kSame;
+    if (own_uvs) source_.uvs.resize(source_.positions.size());
     result_.from.push_back(p);
     source_.positions.push_back(source_.positions[p]);
-    if (!source_.uvs.empty()) source_.uvs.push_back(source_.uvs[p]);
+    if (own_uvs) source_.uvs.push_back(source_.uvs[p]);
     if (!source_.colours.empty()) source_.colours.push_back(source_.colours[p]);
   }
 
