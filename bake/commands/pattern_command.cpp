@@ -10,6 +10,7 @@
 
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/bundle/bundle_json.hpp"
+#include "bake/bundle/files/sorted_files.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/io/output.hpp"
 #include "bake/io/terminal.hpp"
@@ -262,11 +263,15 @@ void print_failure(const Error& error, ExitCode& answer) {
 }
 
 Result<NamedScore> score_named(const ScoreCommand& command, const std::string& path) {
-  ShapeRequest told;
-  if (!command.shape.empty()) {
-    MODAR_ASSIGN(told, parse_shape(command.shape));
+  PatternRequest pattern{path};
+  if (command.shape.empty()) {  // as the bake cuts it out
+    std::vector<Diagnostic> said;
+    MODAR_TRY(find_picture(pattern, said));
+    std::ranges::for_each(said, print_diagnostic);
+  } else {
+    MODAR_ASSIGN(pattern.shape, parse_shape(command.shape));
   }
-  MODAR_ASSIGN(ScoredPicture scored, score_file(path, 0, told, command.jobs));
+  MODAR_ASSIGN(ScoredPicture scored, score_file(path, 0, pattern.shape, command.jobs));
   if (!command.overlay_folder.empty()) {
     MODAR_ASSIGN(const std::string out, picture_of(path, command.overlay_folder));
     MODAR_TRY(write_png(score_overlay(scored.shaped.picture.view(), scored.score), out));

@@ -1,4 +1,5 @@
 """The same files give the same bundle, whoever is handed them; files other than models and pictures are named by their kind, everywhere."""
+import json
 import struct
 import subprocess
 import sys
@@ -68,6 +69,15 @@ class SameFiles(ProgramTest):
         done = self.modar("bake", cwd=self.place)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual((self.place / "out/museum.modar").read_bytes(), (self.folder / "files.modar").read_bytes())
+
+    def test_a_photo_gets_the_same_grade_from_score_and_bake(self):
+        photo(self.place / "card.png")
+        done = self.modar("pattern", "score", "card.png", "--json", cwd=self.place)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stderr, r"card\.png.*corners 1\d\d")
+        self.assertEqual(self.modar("bake", "card.png", "-o", "a.modar", cwd=self.place).returncode, 0)
+        [pattern] = self.modar_json("inspect", self.place / "a.modar")["patterns"]
+        self.assertEqual(json.loads(done.stdout)[0]["score"], pattern["score"])
 
     def test_a_print_from_straight_above_is_doubted(self):
         for size, words in (((640, 480), True), ((640, 440), False)):  # the shape of a camera's photos, and another
