@@ -49,11 +49,6 @@ using modar::usable;
 
 namespace {
 
-// modar_orbit(): the field of view across the smaller side, in radians, as from a hand's distance;
-// and room around the content, as the page's turntable has them.
-constexpr double kOrbitField = 0.6981317007977318;
-constexpr double kOrbitMargin = 1.06;
-
 modar_bundle* opened(modar::Result<modar::MappedFile> file, modar_error* error) {
   if (!file) return fail_null(file.error(), error);
   const auto view = modar::open_bundle(*file);
@@ -264,43 +259,6 @@ size_t modar_pattern_text(const modar_bundle* bundle, uint32_t pattern, int kind
 
 void modar_camera_default(int width, int height, modar_camera* camera) {
   modar::give_camera(modar::default_camera(width, height), camera);
-}
-
-int modar_orbit(const modar_bundle* bundle, uint32_t pattern, const modar_turntable* from,
-                modar_camera* camera, modar_pose* pose) {
-  if (pattern >= modar_pattern_count(bundle)) return 0;
-  if (from == nullptr || camera == nullptr || pose == nullptr) return 0;
-  const auto [size, turn, tilt, zoom] = modar::grown(*from);
-  modar_camera lens = modar::grown(*camera);
-  if (lens.width < 1 || lens.height < 1 || !(zoom > 0.0)) return 0;
-  if (!usable(turn) || !usable(tilt) || !usable(zoom) || !usable(1.0 / zoom)) return 0;
-  const modar::PatternRecord& plane = bundle->view.patterns()[pattern];
-  glm::vec3 low(-plane.half_width, -plane.half_height, 0.0f);
-  glm::vec3 high = -low;
-  modar_pattern_bounds(bundle, pattern, &low.x, &high.x);
-  lens.fx = lens.fy = 0.5 * std::min(lens.width, lens.height) / std::tan(0.5 * kOrbitField);
-  lens.cx = 0.5 * (lens.width - 1);
-  lens.cy = 0.5 * (lens.height - 1);
-  std::fill(std::begin(lens.distortion), std::end(lens.distortion), 0.0);
-  const glm::dvec3 right(std::cos(turn), std::sin(turn), 0.0);
-  const glm::dvec3 back(std::sin(turn) * std::cos(tilt), -std::cos(turn) * std::cos(tilt),
-                        std::sin(tilt));
-  const glm::dvec3 down = -glm::cross(back, right);
-  const glm::dvec3 axes[3] = {right, down, -back};
-  const double radius = 0.5 * glm::length(glm::dvec3(high - low));
-  const double distance = kOrbitMargin * radius / std::sin(0.5 * kOrbitField) / zoom;
-  const glm::dvec3 eye = 0.5 * glm::dvec3(high + low) + distance * back;
-  modar_pose ours{};
-  ours.visible = ours.shown = 1;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      ours.rotation[3 * row + column] = static_cast<float>(axes[row][column]);
-    }
-    ours.translation[row] = static_cast<float>(-glm::dot(axes[row], eye));
-  }
-  modar::give(lens, camera);
-  modar::give(ours, pose);
-  return 1;
 }
 
 void modar_projection(const modar_camera* camera, double near_plane, double far_plane,

@@ -73,3 +73,15 @@ void modar_shrink(const uint8_t* gray, size_t stride, int width, int height, int
     }
   }
 }
+
+double modar_brightness(const uint8_t* gray, size_t stride, int width, int height) {
+  if (gray == nullptr) return 0;
+  constexpr int kStep = 16;
+  double sum = 0;
+  int count = 0;
+  for (int y = 0; y < height; y += kStep) {
+    const uint8_t* row = gray + stride * static_cast<size_t>(y);
+    for (int x = 0; x < width; x += kStep, ++count) sum += row[x];
+  }
+  return count == 0 ? 0 : sum / count;
+}

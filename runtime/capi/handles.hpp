@@ -31,14 +31,6 @@ struct modar_record {
 
 namespace modar {
 
-/// Cuts the text to what the array holds; at most a part of the last UTF-8 letter is lost.
-template <std::size_t kSize>
-void copy_text(const std::string& text, char (&to)[kSize]) {
-  const std::size_t length = std::min(text.size(), kSize - 1);
-  std::memcpy(to, text.data(), length);
-  to[length] = '\0';
-}
-
 static_assert(MODAR_USAGE == static_cast<int>(ExitCode::kUsage));
 static_assert(MODAR_IO == static_cast<int>(ExitCode::kIo));
 static_assert(MODAR_INVALID == static_cast<int>(ExitCode::kInvalidInput));
@@ -55,18 +47,7 @@ void give(Struct ours, Struct* to) {
 }
 
 /// Tells the caller, who may not want to know; answers the status.
-inline int set_error(const Error& error, modar_error* to) {
-  const int status = static_cast<int>(error.exit);
-  if (to == nullptr) return status;
-  modar_error ours{};
-  ours.status = status;
-  copy_text(error.code, ours.code);
-  copy_text(error.where, ours.where);
-  copy_text(error.cause, ours.cause);
-  copy_text(error.cure, ours.cure);
-  give(ours, to);
-  return status;
-}
+int set_error(const Error& error, modar_error* to);
 
 inline int set_error(const Result<void>& result, modar_error* to) {
   return result ? 0 : set_error(result.error(), to);
@@ -112,9 +93,7 @@ inline std::size_t copy_name(std::string_view name, char* text, std::size_t size
 }
 
 /// What a caller forgot.
-inline Error missing(const char* what) {
-  return {ExitCode::kUsage, "capi.null", what, "is NULL", "pass it"};
-}
+Error missing(const char* what);
 
 /// Largest amount of a caller's number: calculations with larger ones overflow. Seconds since 1970
 /// fit, and pixels of a direction next to the camera's plane.
@@ -146,10 +125,7 @@ inline bool usable(const modar_drawing& drawing) {
 }
 
 /// The error of a number that is not usable().
-inline Error bad_number(const char* where) {
-  return {ExitCode::kUsage, "capi.number", where, "is no number, or larger than 1e12",
-          "pass a finite one"};
-}
+Error bad_number(const char* where);
 
 inline Camera camera_of(const modar_camera& theirs) {
   const modar_camera camera = grown(theirs);

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include <glm/ext/matrix_transform.hpp>
-
 #include "modar/pose.hpp"
 
 namespace modar {
@@ -16,8 +14,6 @@ Controls::Controls(const BundleView& bundle, bool outline, bool display)
 }
 
 void Controls::apply(const UserAct& act) {
-  constexpr float kStep = 1.1f;  // a key press resizes by 10 %: seven double a model
-  constexpr float kMost = 20;    // and by so much at most
   constexpr float kVolume = 0.1f;
   switch (act.act) {
     case Act::kQuit:
@@ -42,10 +38,10 @@ void Controls::apply(const UserAct& act) {
       break;
     }
     case Act::kLarger:
-      scale_ = std::min(kMost, scale_ * kStep);
+      machine_->press(MODAR_SIZE, 1);
       break;
     case Act::kSmaller:
-      scale_ = std::max(1 / kMost, scale_ / kStep);
+      machine_->press(MODAR_SIZE, -1);
       break;
     case Act::kDisplay:
       display_ = !display_;
@@ -61,10 +57,10 @@ void Controls::apply(const UserAct& act) {
       corner_count_ = 0;
       break;
     case Act::kSound:
-      sound_ = true;
+      machine_->press(MODAR_SOUND, 1);
       break;
     case Act::kCaptions:
-      captions_ = !captions_;
+      machine_->press(MODAR_CAPTIONS_SHOWN, 1);
       break;
     case Act::kLouder:
       volume_ = std::min(1.0f, volume_ + kVolume);
@@ -72,16 +68,33 @@ void Controls::apply(const UserAct& act) {
     case Act::kQuieter:
       volume_ = std::max(0.0f, volume_ - kVolume);
       break;
-    case Act::kClick:
-      if (frozen_ && corner_count_ < corners_.size()) corners_[corner_count_++] = act.at;
-      if (!frozen_ && tap_count_ < taps_.size()) taps_[tap_count_++] = act.at;
+    case Act::kDown:
+    case Act::kMove:
+    case Act::kUp:
+      touch(act);
       break;
   }
 }
 
+/// A frozen frame takes corners, and nothing turns.
+void Controls::touch(const UserAct& act) {
+  if (frozen_) {
+    if (act.act == Act::kUp && corner_count_ < corners_.size()) corners_[corner_count_++] = act.at;
+    return;
+  }
+  const int kind = act.act == Act::kDown ? MODAR_TOUCH_DOWN
+                   : act.act == Act::kUp ? MODAR_TOUCH_UP
+                                         : MODAR_TOUCH_MOVE;
+  const bool tapped = machine_->touch({sizeof(modar_touch), kind, 0, act.at.x, act.at.y, act.size.x,
+                                       act.size.y}) == MODAR_TAPPED;
+  if (tapped && tap_count_ < taps_.size()) taps_[tap_count_++] = act.at;
+}
+
 void Controls::load(const BundleView& bundle) {
   bundle_ = bundle;
-  machine_ = std::make_unique<ActionMachine>(bundle);
+  auto machine = std::make_unique<ScreenMachine>(bundle);
+  if (machine_) machine->inherit(*machine_);
+  machine_ = std::move(machine);
   // Each pattern, the tapped node, and each node that ends.
   events_.reserve(bundle.patterns().size() + taps_.size() + bundle.nodes().size());
   if (model_ != kNone && model_ >= bundle.models().size()) model_ = kNone;
@@ -120,10 +133,7 @@ std::span<const SceneCommand> Controls::collect(std::span<const Hysteresis::Stat
   for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {
     const Hysteresis::State& state = states[pattern];
     if (!wants(pattern) || !state.shown) continue;
-    add_items(bundle_, *machine_, pattern, gl_view(state.pose, state.stretch), items);
-  }
-  for (DrawItem& item : items) {
-    if (item.model != kNone) item.to_eye = glm::scale(item.to_eye, glm::vec3(scale_));
+    machine_->add_items(pattern, gl_view(state.pose, state.stretch), items);
   }
   return commands;
 }
@@ -144,9 +154,8 @@ void Controls::add_standard(const Hysteresis::State& state, std::uint32_t model,
   SceneRecord standard{};
   standard.scale = 1;
   standard.rotation[3] = 1;
-  const glm::mat4 view = gl_view(state.pose, state.stretch);
-  const glm::mat4 place = view * scene_matrix(standard);
-  items.push_back({model, glm::scale(place, glm::vec3(scale_)), kNone, view});
+  items.push_back({model, scene_matrix(standard), kNone, {}});
+  machine_->place(gl_view(state.pose, state.stretch), std::span(items).last(1));
 }
 
 std::span<const glm::dvec2> Controls::take_taps() {

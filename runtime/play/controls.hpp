@@ -10,9 +10,8 @@
 
 #include <glm/vec2.hpp>
 
-#include "formats/action_machine.hpp"
 #include "formats/bundle_view.hpp"
-#include "modar/renderer.hpp"
+#include "modar/screen_machine.hpp"
 #include "modar/tracker.hpp"
 
 namespace modar {
@@ -32,12 +31,15 @@ enum class Act : std::uint8_t {
   kCaptions,  ///< on or off
   kLouder,
   kQuieter,
-  kClick,
+  kDown,  ///< the mouse's button
+  kMove,  ///< with it
+  kUp,
 };
 
 struct UserAct {
   Act act = Act::kQuit;
-  glm::dvec2 at{0.0};  ///< of a click: picture pixels
+  glm::dvec2 at{0.0};    ///< of the mouse: picture pixels
+  glm::dvec2 size{1.0};  ///< the picture's
 };
 
 class Controls {
@@ -69,10 +71,9 @@ class Controls {
   [[nodiscard]] bool quit() const { return quit_; }
   [[nodiscard]] bool outline() const { return outline_; }
   [[nodiscard]] bool display() const { return display_; }
-  [[nodiscard]] bool captions() const { return captions_; }
+  /// Whether there are sound and captions.
+  [[nodiscard]] const modar_status& status() const { return machine_->status(); }
   [[nodiscard]] float volume() const { return volume_; }  ///< 0 to 1
-  /// True once after the user asked for sound, or for none.
-  bool take_sound() { return std::exchange(sound_, false); }
   /// The picture stands still: paused, or frozen for corners.
   [[nodiscard]] bool holds() const { return paused_ || frozen_; }
   [[nodiscard]] bool frozen() const { return frozen_; }
@@ -83,6 +84,7 @@ class Controls {
   bool take_corners(std::array<glm::dvec2, 4>& corners);
 
  private:
+  void touch(const UserAct& act);
   void turn_model(int step);
   void add_standard(const Hysteresis::State& state, std::uint32_t model,
                     std::vector<DrawItem>& items) const;
@@ -91,21 +93,18 @@ class Controls {
                                     std::span<const SceneEvent> events);
 
   BundleView bundle_;
-  std::unique_ptr<ActionMachine> machine_;
+  std::unique_ptr<ScreenMachine> machine_;
   std::vector<SceneEvent> events_;
   std::array<glm::dvec2, 8> taps_{};  ///< in one frame's time
   std::size_t tap_count_ = 0;
   bool quit_ = false;
   bool outline_;
   bool display_;
-  bool captions_ = true;
-  bool sound_ = false;
   float volume_ = 1;
   bool paused_ = false;
   bool frozen_ = false;
   std::uint32_t model_ = kNone;         ///< kNone: as the scenes say
   std::uint32_t only_pattern_ = kNone;  ///< kNone: all of them
-  float scale_ = 1;
   std::array<glm::dvec2, 4> corners_{};
   std::size_t corner_count_ = 0;
 };

@@ -38,7 +38,8 @@ Result<const Media*> media() {
   if (loaded != nullptr) return loaded;
   const std::string path = library_path();
   if (void* handle = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL)) {
-    const auto open = reinterpret_cast<decltype(&modar_media)>(dlsym(handle, "modar_media"));
+    const auto open =
+        reinterpret_cast<decltype(&modar_play_media)>(dlsym(handle, "modar_play_media"));
     if (open != nullptr) return loaded = open();
   }
   const char* reason = dlerror();

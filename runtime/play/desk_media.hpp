@@ -72,4 +72,4 @@ Result<const Media*> media();
 }  // namespace modar
 
 /// The one function that the library exports.
-extern "C" const modar::Media* modar_media();
+extern "C" const modar::Media* modar_play_media();

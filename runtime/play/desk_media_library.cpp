@@ -482,7 +482,7 @@ Result<std::vector<std::uint8_t>> encode_png(const std::uint8_t* pixels, int wid
 }  // namespace
 }  // namespace modar
 
-extern "C" const modar::Media* modar_media() {
+extern "C" const modar::Media* modar_play_media() {
   static const modar::Media media = {modar::open_path,  modar::open_camera, modar::open_movie,
                                      modar::encode_png, modar::open_clip,   modar::open_sound};
   return &media;

@@ -150,7 +150,7 @@ struct Clip {
 class DeskSceneMedia final : public SceneMedia {
  public:
   DeskSceneMedia(const BundleView& bundle, const SceneMediaSetup& setup)
-      : bundle_(bundle), setup_(setup), sound_(setup.sound) {
+      : bundle_(bundle), setup_(setup) {
     for (std::uint32_t i = 0; i < bundle.nodes().size(); ++i) {
       const NodeRecord& node = bundle.nodes()[i];
       if (!plays_media(node)) continue;
@@ -191,22 +191,19 @@ class DeskSceneMedia final : public SceneMedia {
   }
 
   const SceneState& execute(std::span<const SceneCommand> commands,
-                            std::span<const SceneEvent> events, Controls& controls) override {
+                            const Controls& controls) override {
     log_.commands.clear();
     log_.told.clear();
-    const bool tapped = std::any_of(events.begin(), events.end(), [](const SceneEvent& event) {
-      return event.kind == SceneEvent::Kind::kTap;
-    });
     for (const SceneCommand& command : commands) {
       log_.commands.push_back(words_of(bundle_, command));
       tell(bundle_, command, log_.told);
-      play(command, tapped);
+      play(command);
     }
-    if (controls.take_sound()) set_sound(!sound_);
+    sound_ = controls.status().sound != 0;
     volume_ = controls.volume();
     std::string caption;
     for (Clip& clip : clips_) {
-      if (clip.playing && controls.captions()) {
+      if (clip.playing && controls.status().captions != 0) {
         add_line(words_at(clip.captions, clip.position), caption);
       }
       listen(clip);
@@ -240,19 +237,12 @@ class DeskSceneMedia final : public SceneMedia {
   }
 
  private:
-  void set_sound(bool on) {
-    asked_ = true;
-    sound_ = on;
-  }
-
-  void play(const SceneCommand& command, bool tapped) {
+  void play(const SceneCommand& command) {
     const bool plays = command.command == ActionCommand::kPlay;
     if (!plays && command.command != ActionCommand::kPause) return;
     for (Clip& clip : clips_) {
       if (clip.node == command.node) start(clip, plays);
     }
-    // Who asked for it by a click hears it, unless sound was turned off.
-    if (plays && tapped && !asked_) set_sound(true);
   }
 
   static void start(Clip& clip, bool plays) {
@@ -308,8 +298,7 @@ class DeskSceneMedia final : public SceneMedia {
   std::string title_;  ///< the caption in the window's title
   double time_s_ = 0;
   float volume_ = 1;
-  bool sound_;
-  bool asked_ = false;  ///< the user has said whether there is to be sound
+  bool sound_ = false;
   bool held_ = false;
   bool audio_ = false;  ///< SDL's part is there
 };

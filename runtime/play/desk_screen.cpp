@@ -23,6 +23,8 @@ struct Window::State {
   glm::dvec2 picture{1.0};  ///< its size
   bool lost = false;
 
+  void touch(Act act, int x, int y);
+
   State() = default;
   State(const State&) = delete;
   State& operator=(const State&) = delete;
@@ -64,18 +66,20 @@ const KeyAct* act_of(SDL_Keycode key) {
   return found == std::end(kKeys) ? nullptr : found;
 }
 
-/// Window coordinates to pixels of the picture, which is centred in the window as large as it fits
-/// (Renderer::blit_to_window()).
-glm::dvec2 picture_point(SDL_Window* window, glm::dvec2 picture, int x, int y) {
+}  // namespace
+
+/// From window coordinates to pixels of the picture, which is centred in the window as large as it
+/// fits (Renderer::blit_to_window()).
+void Window::State::touch(Act act, int x, int y) {
   int width = 1;
   int height = 1;
   SDL_GetWindowSize(window, &width, &height);
   const double scale = std::min(width / picture.x, height / picture.y);
-  return {(x + 0.5 - width / 2.0) / scale + picture.x / 2.0 - 0.5,
-          (y + 0.5 - height / 2.0) / scale + picture.y / 2.0 - 0.5};
+  acts.push_back({act,
+                  {(x + 0.5 - width / 2.0) / scale + picture.x / 2.0 - 0.5,
+                   (y + 0.5 - height / 2.0) / scale + picture.y / 2.0 - 0.5},
+                  picture});
 }
-
-}  // namespace
 
 Window::Window(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Window::~Window() = default;
@@ -121,17 +125,19 @@ std::span<const UserAct> Window::acts(std::chrono::milliseconds limit) {
   int more = limit.count() > 0 ? SDL_WaitEventTimeout(&event, static_cast<int>(limit.count()))
                                : SDL_PollEvent(&event);
   for (; more != 0; more = SDL_PollEvent(&event)) {
-    UserAct act;
+    const bool button = event.button.button == SDL_BUTTON_LEFT;
     if (event.type == SDL_RENDER_DEVICE_RESET || event.type == SDL_APP_DIDENTERFOREGROUND) {
       state_->lost = true;
     } else if (event.type == SDL_QUIT) {
-      state_->acts.push_back({Act::kQuit, {}});
+      state_->acts.push_back({});
     } else if (event.type == SDL_KEYDOWN) {
-      if (const KeyAct* key = act_of(event.key.keysym.sym)) state_->acts.push_back({key->act, {}});
-    } else if (event.type == SDL_MOUSEBUTTONDOWN && event.button.button == SDL_BUTTON_LEFT) {
-      act.act = Act::kClick;
-      act.at = picture_point(state_->window, state_->picture, event.button.x, event.button.y);
-      state_->acts.push_back(act);
+      if (const KeyAct* key = act_of(event.key.keysym.sym)) state_->acts.push_back({key->act});
+    } else if (event.type == SDL_MOUSEBUTTONDOWN && button) {
+      state_->touch(Act::kDown, event.button.x, event.button.y);
+    } else if (event.type == SDL_MOUSEBUTTONUP && button) {
+      state_->touch(Act::kUp, event.button.x, event.button.y);
+    } else if (event.type == SDL_MOUSEMOTION && (event.motion.state & SDL_BUTTON_LMASK) != 0) {
+      state_->touch(Act::kMove, event.motion.x, event.motion.y);
     }
   }
   return state_->acts;

@@ -87,6 +87,7 @@ Player::Player(const PlayOptions& options, const BundleView& bundle)
       smoother_(names_.size(), options.smooth_ms),
       controls_(bundle, options.outline || is_bare(bundle), options.osd || options.window),
       progress_(!options.quiet) {
+  if (options.sound) controls_.apply({Act::kSound});
   items_.reserve(
       std::max(bundle.scenes().size() + bundle.nodes().size(), bundle.patterns().size()));
 }
@@ -262,7 +263,7 @@ void Player::collect(std::span<const Hysteresis::State> states, const Job& job,
   if (media_) media_->advance(report.time_s, events_);
   const auto commands = controls_.collect(states, report.time_s, events_, items_);
   if (!media_) return;
-  report.scene = &media_->execute(commands, events_, controls_);
+  report.scene = &media_->execute(commands, controls_);
   if (options_.quiet || report.scene->told.empty()) return;
   progress_.end();
   std::fputs(report.scene->told.c_str(), stderr);

@@ -24,10 +24,10 @@ class SceneMedia {
 
   /// To a frame's time, seconds: appends what came to its end for the actions' step of that frame.
   virtual void advance(double time_s, std::vector<SceneEvent>& events) = 0;
-  /// What that step asked for, of these events, and what the user asks of sounds and captions.
-  /// Answers the frame's log, which lives until the next call.
+  /// What that step asked for, and what the user asks of sounds and captions. Answers the frame's
+  /// log, which lives until the next call.
   virtual const SceneState& execute(std::span<const SceneCommand> commands,
-                                    std::span<const SceneEvent> events, Controls& controls) = 0;
+                                    const Controls& controls) = 0;
   /// Updates the pictures and the caption on the screen. Errors: those of the library of
   /// media.
   virtual Result<void> show(Screen& screen) = 0;

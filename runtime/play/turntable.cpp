@@ -93,7 +93,7 @@ Subject model_subject(const BundleView& bundle, std::uint32_t model) {
 /// The first pictures of a pattern, videos with their posters.
 Subject pattern_subject(const BundleView& bundle, std::uint32_t pattern) {
   Subject subject{bundle.name(bundle.patterns()[pattern].name), 0, {}};
-  add_items(bundle, ActionMachine(bundle), pattern, glm::mat4(1.0f), subject.items);
+  add_items(bundle, ActionMachine(bundle), pattern, subject.items);
   for (const DrawItem& item : subject.items) {
     const glm::mat4& place = item.to_eye;  // of a square from -1 to 1
     const float half = glm::dot(place[0], place[0]) + glm::dot(place[1], place[1]);

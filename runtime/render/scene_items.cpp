@@ -40,7 +40,7 @@ bool is_picture(const BundleView& bundle, std::uint32_t node) {
 }
 
 void add_items(const BundleView& bundle, const ActionMachine& machine, std::uint32_t pattern,
-               const glm::mat4& view, std::vector<DrawItem>& items) {
+               std::vector<DrawItem>& items) {
   const auto add = [&](std::uint32_t model, const glm::mat4& place, std::uint32_t scene,
                        std::uint32_t node) {
     glm::mat4 turned = place;
@@ -48,7 +48,7 @@ void add_items(const BundleView& bundle, const ActionMachine& machine, std::uint
       if (!machine.shown(node)) return;
       turned = turn_about(machine.turn_of(node), glm::vec3(place[3])) * place;
     }
-    DrawItem item{model, view * turned, scene, view};
+    DrawItem item{model, turned, scene, glm::mat4(1.0f)};
     item.node = node;
     items.push_back(item);
   };

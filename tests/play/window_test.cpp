@@ -24,12 +24,19 @@ void press(SDL_Keycode key) {
   SDL_PushEvent(&event);
 }
 
-void click(int x, int y, std::uint8_t button) {
+void mouse(SDL_EventType type, int x, int y, int button) {
   SDL_Event event{};
-  event.type = SDL_MOUSEBUTTONDOWN;
-  event.button.button = button;
+  event.type = type;
+  event.button.button = static_cast<std::uint8_t>(button);
   event.button.x = x;
   event.button.y = y;
+  if (type == SDL_MOUSEMOTION) {
+    event.motion = {};
+    event.type = type;
+    event.motion.state = static_cast<std::uint32_t>(SDL_BUTTON(button));
+    event.motion.x = x;
+    event.motion.y = y;
+  }
   SDL_PushEvent(&event);
 }
 
@@ -81,19 +88,26 @@ TEST_F(WindowTest, ClosingIsQuitting) {
   EXPECT_EQ(acts[0].act, Act::kQuit);
 }
 
-TEST_F(WindowTest, ClicksAreInPixelsOfThePicture) {
+TEST_F(WindowTest, TheMouseIsInPixelsOfThePicture) {
   window_->fit(320, 240);
   const int width = window_->width();
   const int height = window_->height();
   ASSERT_GT(width, 0);
-  click(width / 2, height / 2, SDL_BUTTON_LEFT);
-  click(3, 3, SDL_BUTTON_RIGHT);
+  for (const auto button : {SDL_BUTTON_LEFT, SDL_BUTTON_RIGHT}) {
+    mouse(SDL_MOUSEBUTTONDOWN, width / 2, height / 2, button);
+    mouse(SDL_MOUSEMOTION, width / 2, height / 2, button);
+    mouse(SDL_MOUSEBUTTONUP, width / 2, height / 2, button);
+  }
   const auto acts = window_->acts(milliseconds(0));
-  ASSERT_EQ(acts.size(), 1u) << "the right button means nothing";
-  EXPECT_EQ(acts[0].act, Act::kClick);
-  // The picture's middle is between its pixels 159 and 160, 119 and 120.
-  EXPECT_NEAR(acts[0].at.x, 159.5, 1.0);
-  EXPECT_NEAR(acts[0].at.y, 119.5, 1.0);
+  ASSERT_EQ(acts.size(), 3u) << "the right button means nothing";
+  const Act wanted[] = {Act::kDown, Act::kMove, Act::kUp};
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(acts[i].act, wanted[i]);
+    EXPECT_EQ(acts[i].size, glm::dvec2(320, 240));
+    // The picture's middle is between its pixels 159 and 160, 119 and 120.
+    EXPECT_NEAR(acts[i].at.x, 159.5, 1.0);
+    EXPECT_NEAR(acts[i].at.y, 119.5, 1.0);
+  }
 }
 
 TEST_F(WindowTest, ALostContextIsMadeAnewAndShowsTheSame) {

@@ -34,7 +34,7 @@ class CapiNumbers : public ::testing::Test {
     renderer_ = modar_renderer_create(bundle_, nullptr, 0, nullptr);
     ASSERT_NE(renderer_, nullptr);
     ASSERT_EQ(modar_renderer_resize(renderer_, kSide, kSide, nullptr), 0);
-    actions_ = modar_actions_create(bundle_, nullptr);
+    screen_ = modar_screen_create(bundle_, nullptr);
     modar_scene_at(bundle_, 0, &scene_);
     modar_camera_default(kSide, kSide, &camera_);
     modar_render_options_default(&options_);
@@ -47,7 +47,7 @@ class CapiNumbers : public ::testing::Test {
     pose_.translation[2] = 4;
   }
   void TearDown() override {
-    modar_actions_destroy(actions_);
+    modar_screen_destroy(screen_);
     modar_renderer_destroy(renderer_);
     modar_context_destroy(context_);
     modar_bundle_close(bundle_);
@@ -72,9 +72,9 @@ class CapiNumbers : public ::testing::Test {
     auto hit = sized<modar_hit>();
     modar_pick(bundle_, &drawing, 32, 32, &hit);
     auto label = sized<modar_label>();
-    modar_label_project(actions_, 2, &drawing, view_, &label);
+    modar_label_project(screen_, 2, &drawing, view_, &label);
     modar_item items[8] = {sized<modar_item>()};
-    modar_actions_items(actions_, 0, view_, items, std::size(items));
+    modar_screen_items(screen_, 0, view_, items, std::size(items));
     modar_tracker_destroy(modar_tracker_create(bundle_, &camera_, nullptr, nullptr));
   }
   void draw_arrays();
@@ -86,7 +86,7 @@ class CapiNumbers : public ::testing::Test {
   modar_bundle* bundle_ = nullptr;
   modar_context* context_ = nullptr;
   modar_renderer* renderer_ = nullptr;
-  modar_actions* actions_ = nullptr;
+  modar_screen* screen_ = nullptr;
   modar_scene scene_ = sized<modar_scene>();
   modar_camera camera_ = sized<modar_camera>();
   modar_picture picture_ = sized<modar_picture>();
@@ -166,9 +166,27 @@ int CapiNumbers::count_answers() {
   int orbits = 0;
   for (double* place : {&from.turn, &from.tilt, &from.zoom})
     each(place, 1, [&] { orbits += modar_orbit(bundle_, 0, &from, &camera, &pose); });
+  modar_touch touch{sizeof touch, MODAR_TOUCH_DOWN, 1, 9, 9, 64, 64};
+  modar_screen_touch(screen_, &touch);
+  touch.kind = MODAR_TOUCH_MOVE;
+  touch.x = touch.y = 50;
+  int moves = 0;
+  for (double* place : {&touch.x, &touch.y, &touch.width, &touch.height})
+    each(place, 1, [&] { moves += modar_screen_touch(screen_, &touch); });
+  for (const int button : {MODAR_TURN, MODAR_TILT, MODAR_SIZE})
+    modar_screen_press(screen_, button, number_);
+  modar_screen_look_around(screen_, 0, number_, 1);
+  modar_screen_follow(screen_, number_, 1, 0, 100);
+  modar_screen_follow(screen_, 0, 1, 0, number_);
+  auto status = sized<modar_status>();
+  modar_screen_status(screen_, &status);
+  moves += status.state;
+  moves += modar_screen_turntable(screen_, number_, &from);
+  modar_screen_turntable(screen_, 0, &from);
+  moves += from.turn != 0 || from.zoom != 1 || modar_screen_waiting(screen_) != 0 ? 1 : 0;
   const bool words = modar_node_caption(bundle_, 4, "en", number_, text, sizeof text) != 0;
-  return flats + track() + (words ? 1 : 0) + (x != -7 ? 1 : 0) + (out_[0] != -7 ? 1 : 0) + orbits +
-         static_cast<int>(modar_actions_step(actions_, number_, nullptr, 0)) +
+  return flats + track() + moves + (words ? 1 : 0) + (x != -7 ? 1 : 0) + (out_[0] != -7 ? 1 : 0) +
+         orbits + static_cast<int>(modar_screen_step(screen_, number_, nullptr, 0)) +
          modar_pick(bundle_, &drawing_, number_, 3, &hit) +
          modar_pick(bundle_, &drawing_, 3, number_, &hit);
 }

@@ -2,6 +2,7 @@
 #include <GLES2/gl2.h>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "modar/screen_machine.hpp"
 #include "tests/render/scene.hpp"
 
 namespace modar {
@@ -62,9 +63,8 @@ TEST_F(PlaneTest, ShowsItsTexelsWhereItStands) {
   const MappedBundle bundle(maker.content);
   auto renderer = make_renderer(*bundle.view, probe_gl_caps());
   ASSERT_NE(renderer, nullptr);
-  ActionMachine machine(*bundle.view);
   std::vector<DrawItem> items;
-  add_items(*bundle.view, machine, 0, over_plane(0), items);
+  ScreenMachine(*bundle.view).add_items(0, over_plane(0), items);
   ASSERT_EQ(items.size(), 2u);
   const auto pixels = draw(*renderer, camera_above(kPlaneSide), items);
   // By the tables of ETC1: 17 times the four bits, and 2 or 8 of its modifiers.

@@ -742,6 +742,14 @@ class Page(ProgramTest):
             self.assertNotEqual(self.browser.run(picture % handle)[2], first[2], handle)
             self.assertEqual(self.browser.run(picture % "reset")[2], first[2], handle)
         self.assertGreater(self.browser.run(picture % "larger")[0], first[0])
+        part = """const models = part('models');
+          models.setPointerCapture = () => {};
+          for (const [type, x] of [['pointerdown', 0], ['pointermove', %d], ['pointerup', %d]])
+            models.dispatchEvent(new PointerEvent(type, { pointerId: 1, clientX: x, clientY: 400 }));"""
+        self.browser.run("part('reset').click()")
+        for across, same in ((390, True), (97, False)):  # of 390: once around, and a quarter
+            dragged = self.browser.run(picture.replace("part('%s').click();", "%s") % (part % (across, across)))
+            self.assertEqual(dragged[2] == first[2], same, across)
         names = self.browser.run("['models', 'stage', 'close'].map((id) => part(id).getAttribute('aria-label'))")
         self.assertEqual(names, ["A pot with two handles, on the picture The book of owls.", "View without a camera", "Back"])
         label = self.browser.run("part('label').textContent")

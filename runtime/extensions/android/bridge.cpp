@@ -34,27 +34,16 @@ void misuse(JNIEnv* env, const char* code, const char* where, const char* cause,
 
 // --- Sessions ---
 
-/// What a visitor's fingers did to the models.
-struct Gesture {
-  float scale = 1;
-  float turn = 0;  ///< radians about the pattern's normal
-  float x = 0;     ///< along the pattern, half largest sides
-  float y = 0;
-};
-
 /// A picture of the visitor's own, after the bundle's patterns.
-struct OwnPicture {
-  std::unique_ptr<modar_record, decltype(&modar_record_close)> record;
-  std::uint32_t scene = 0;  ///< its content
-};
+using OwnRecord = std::unique_ptr<modar_record, decltype(&modar_record_close)>;
 
 /// A bundle with the objects made from it. The camera's thread tracks while GL's thread draws.
 struct Session {
   std::mutex tracking;  ///< holds tracker
-  std::mutex drawing;   ///< holds renderer, surfaces, actions, events, items, gesture
+  std::mutex drawing;   ///< holds renderer, surfaces, screen, events, items
   // Both guards to write, either to read:
   modar_bundle* bundle = nullptr;  ///< null once it is closed
-  std::vector<OwnPicture> own;
+  std::vector<OwnRecord> own;
   modar_camera camera = modar::sized<modar_camera>();  ///< width 0: not known yet
   modar_tracker* tracker = nullptr;
   modar_renderer* renderer = nullptr;
@@ -62,13 +51,14 @@ struct Session {
   modar_surface drawn_surface =
       modar::sized<modar_surface>();  ///< the places of the items on the screen,
   modar_camera drawn_camera = modar::sized<modar_camera>();  ///< width 0: nothing drawn yet
-  modar_actions* actions = nullptr;
+  modar_screen* screen = nullptr;
   std::vector<modar_event> events;  ///< taps since the last frame, then its detections
   std::vector<modar_item> items;
   std::size_t item_count = 0;  ///< that were drawn last
+  int reason = 0;              ///< of the newest frame, as modar_tracker_reason()
+  double brightness = 0;       ///< of it
   bool alone = true;           ///< nothing but the renderer draws in GLSurfaceView's context
   std::vector<float> poses;    ///< on which these stand, as org.modar.Poses has them
-  Gesture gesture;
 
   /// The bundle's patterns, then the visitor's own.
   [[nodiscard]] std::uint32_t patterns() const {
@@ -148,7 +138,7 @@ jlong opened(JNIEnv* env, modar_bundle* bundle, const modar_error& error) {
   }
   auto session = std::make_shared<Session>();
   session->bundle = bundle;
-  session->actions = modar_actions_create(bundle, nullptr);
+  session->screen = modar_screen_create(bundle, nullptr);
   auto media = modar::sized<modar_media>();
   session->alone = modar_media_at(bundle, 0, &media) == 0;
   session->items.resize(modar_scene_count(bundle) + modar_node_count(bundle) + 1,
@@ -298,6 +288,9 @@ jint track(JNIEnv* env, Session& session, const std::uint8_t* luma, std::size_t 
   {
     const std::lock_guard drawing(session.drawing);
     modar_tracker_camera(session.tracker, &session.camera);
+    session.reason = modar_tracker_reason(session.tracker);
+    session.brightness =
+        modar_brightness(luma, stride, session.camera.width, session.camera.height);
   }
   jint visible = 0;
   const std::uint32_t patterns = session.patterns();
@@ -310,29 +303,25 @@ jint track(JNIEnv* env, Session& session, const std::uint8_t* luma, std::size_t 
   return visible;
 }
 
-/// place := gesture * place, in the pattern's space.
-void apply(const Gesture& gesture, float place[16]) {
-  const float cosine = gesture.scale * std::cos(gesture.turn);
-  const float sine = gesture.scale * std::sin(gesture.turn);
-  for (int column = 0; column < 4; ++column) {
-    float* const v = place + 4 * column;
-    const float x = v[0];
-    const float y = v[1];
-    v[0] = cosine * x - sine * y + gesture.x * v[3];
-    v[1] = sine * x + cosine * y + gesture.y * v[3];
-    v[2] *= gesture.scale;
-  }
+jintArray java_words(JNIEnv* env, const std::vector<jint>& words) {
+  const auto size = static_cast<jsize>(words.size());
+  const jintArray array = env->NewIntArray(size);
+  if (array != nullptr) env->SetIntArrayRegion(array, 0, size, words.data());
+  return array;
 }
 
 /// Runs the bundle's actions; answers how many commands they give.
 std::size_t act(Session& session, double time_s, const float* poses) {
-  for (std::uint32_t p = 0; p < modar_pattern_count(session.bundle); ++p) {
+  std::uint32_t first = 0;
+  for (std::uint32_t p = session.patterns(); p-- > 0;) {
     if (poses[p * kPoseFloats + kShown] == 0) continue;
     session.events.push_back(modar::sized<modar_event>());
     session.events.back().subject = p;
+    first = p + 1;
   }
+  modar_screen_follow(session.screen, time_s, first, session.reason, session.brightness);
   const std::size_t commands =
-      modar_actions_step(session.actions, time_s, session.events.data(), session.events.size());
+      modar_screen_step(session.screen, time_s, session.events.data(), session.events.size());
   session.events.clear();
   return commands;
 }
@@ -347,63 +336,15 @@ jstring text_or_null(JNIEnv* env, const Copy& copy) {
   return java_text(env, text.c_str());
 }
 
-/// Of a view, which has the stretch in it.
-modar_pose pose_of(const float* view) {
-  auto pose = modar::sized<modar_pose>();
-  for (int row = 0; row < 3; ++row, ++view) {
-    const float sign = row == 0 ? 1.0f : -1.0f;  // GL's camera has y up and z backward
-    for (int column = 0; column < 3; ++column) {
-      pose.rotation[3 * row + column] = sign * view[4 * column];
-    }
-    pose.translation[row] = sign * view[12];
-  }
-  return pose;
-}
-
-/// The content of a pattern, into items; answers how many there are. The visitor's own pictures
-/// have a scene of the bundle's each.
-std::size_t items_on(const Session& session, std::uint32_t pattern, modar_item* items,
-                     std::size_t capacity) {
-  constexpr float kStill[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-  const std::uint32_t baked = modar_pattern_count(session.bundle);
-  if (pattern < baked) {
-    return modar_actions_items(session.actions, pattern, kStill, items, capacity);
-  }
-  auto scene = modar::sized<modar_scene>();
-  if (capacity == 0 ||
-      modar_scene_at(session.bundle, session.own[pattern - baked].scene, &scene) == 0) {
-    return 0;
-  }
-  *items = modar::sized<modar_item>();
-  items->model = scene.model;
-  items->scene = scene.number;
-  std::memcpy(items->to_eye, scene.place, sizeof scene.place);
-  return 1;
-}
-
-/// The content of the patterns that are shown. Gestures move models; pictures belong to their
-/// patterns.
+/// The content of the patterns that are shown.
 void place_items(Session& session, const float* poses) {
   session.item_count = 0;
   session.poses.assign(poses, poses + session.patterns() * kPoseFloats);
-  const Gesture& gesture = session.gesture;
-  const bool moved = gesture.scale != 1 || gesture.turn != 0 || gesture.x != 0 || gesture.y != 0;
-  for (std::uint32_t p = 0; p < session.patterns(); ++p) {
-    const float* from = poses + p * kPoseFloats;
-    if (from[kShown] == 0) continue;
-    modar_item* items = session.items.data() + session.item_count;
-    const std::size_t count =
-        items_on(session, p, items, session.items.size() - session.item_count);
-    const modar_pose pose = pose_of(from + kView);
-    for (std::size_t i = 0; i < count; ++i) {
-      auto scene = modar::sized<modar_scene>();
-      scene.model = items[i].model;
-      scene.number = items[i].scene;
-      std::memcpy(scene.place, items[i].to_eye, sizeof scene.place);
-      if (moved && scene.number != 0) apply(gesture, scene.place);
-      modar_item_place(&items[i], &scene, &pose);
-    }
-    session.item_count += count;
+  for (std::uint32_t p = 0; p < session.patterns(); ++p, poses += kPoseFloats) {
+    if (poses[kShown] == 0) continue;
+    session.item_count += modar_screen_items(session.screen, p, poses + kView,
+                                             session.items.data() + session.item_count,
+                                             session.items.size() - session.item_count);
   }
 }
 
@@ -426,21 +367,20 @@ void draw(Session& session, const modar_picture* picture, const float* poses) {
 }
 
 /// The content of a pattern, from an eye that fingers move around it.
-void draw_orbit(Session& session, std::uint32_t pattern, double turn, double tilt, double zoom) {
+void draw_orbit(Session& session, std::uint32_t pattern, double time_s) {
   auto surface = session.surface;
   surface.rotation = surface.mirror = 0;
   auto camera = modar::sized<modar_camera>();
   camera.width = surface.width;
   camera.height = surface.height;
+  auto from = modar::sized<modar_turntable>();
   auto pose = modar::sized<modar_pose>();
-  const modar_turntable from = {sizeof from, turn, tilt, zoom};
+  if (modar_screen_turntable(session.screen, time_s, &from) == 0) return;
   if (modar_orbit(session.bundle, pattern, &from, &camera, &pose) == 0) return;
   std::vector<float> poses(session.patterns() * kPoseFloats, 0.0f);
   poses[pattern * kPoseFloats + kShown] = 1;
   modar_view(&pose, poses.data() + pattern * kPoseFloats + kView);
-  const Gesture before = std::exchange(session.gesture, {});  // of the camera's view
   place_items(session, poses.data());
-  session.gesture = before;
   draw_items(session, surface, camera, nullptr);
 }
 
@@ -529,7 +469,7 @@ MODAR_NATIVE(void, close)(JNIEnv*, jclass, jlong number) {
   const std::scoped_lock both(session->tracking, session->drawing);
   modar_tracker_destroy(std::exchange(session->tracker, nullptr));
   modar_renderer_destroy(std::exchange(session->renderer, nullptr));
-  modar_actions_destroy(std::exchange(session->actions, nullptr));
+  modar_screen_destroy(std::exchange(session->screen, nullptr));
   modar_bundle_close(std::exchange(session->bundle, nullptr));
 }
 
@@ -605,8 +545,8 @@ MODAR_NATIVE(void, setCamera)
   modar_tracker* tracker = modar_tracker_create(session->bundle, &camera, &options, &error);
   if (tracker == nullptr) return throw_error(env, error);
   modar_tracker_destroy(std::exchange(session->tracker, tracker));
-  for (const OwnPicture& own : session->own) {
-    if (modar_tracker_add_pattern(tracker, own.record.get(), nullptr, &error) != 0) {
+  for (const OwnRecord& own : session->own) {
+    if (modar_tracker_add_pattern(tracker, own.get(), nullptr, &error) != 0) {
       return throw_error(env, error);
     }
   }
@@ -627,16 +567,16 @@ MODAR_NATIVE(void, addPattern)
     return misuse(env, "android.index", "scene", "the bundle has nothing with that number",
                   "count first");
   }
-  OwnPicture own{{modar_record_open(record.get(),
-                                    static_cast<std::size_t>(env->GetArrayLength(bytes)), &error),
-                  modar_record_close},
-                 static_cast<std::uint32_t>(scene)};
-  if (own.record == nullptr) return throw_error(env, error);
+  OwnRecord own{
+      modar_record_open(record.get(), static_cast<std::size_t>(env->GetArrayLength(bytes)), &error),
+      modar_record_close};
+  if (own == nullptr) return throw_error(env, error);
   const std::lock_guard drawing(session->drawing);
   // Made anew by setCamera(), with this one.
   modar_tracker_destroy(std::exchange(session->tracker, nullptr));
   session->camera = modar::sized<modar_camera>();
   session->own.push_back(std::move(own));
+  modar_screen_add_pattern(session->screen, static_cast<std::uint32_t>(scene));
   session->items.emplace_back(modar::sized<modar_item>());
 }
 
@@ -754,10 +694,45 @@ MODAR_NATIVE(void, onSurfaceChanged)
   session->surface = surface;
 }
 
-MODAR_NATIVE(void, setGesture)
-(JNIEnv* env, jclass, jlong number, jfloat scale, jfloat turn, jfloat x, jfloat y) {
+MODAR_NATIVE(jint, touch)
+(JNIEnv* env, jclass, jlong number, jint kind, jint finger, jfloat x, jfloat y) {
   const Use session(env, number, &Session::drawing);
-  if (session) session->gesture = {scale, turn, x, y};
+  if (!session) return MODAR_NOTHING;
+  const modar_touch touch = {sizeof touch,
+                             kind,
+                             finger,
+                             double{x},
+                             double{y},
+                             static_cast<double>(session->surface.width),
+                             static_cast<double>(session->surface.height)};
+  return modar_screen_touch(session->screen, &touch);
+}
+
+MODAR_NATIVE(void, press)(JNIEnv* env, jclass, jlong number, jint button) {
+  const Use session(env, number, &Session::drawing);
+  if (session) modar_screen_press(session->screen, button, 1);
+}
+
+MODAR_NATIVE(jintArray, status)(JNIEnv* env, jclass, jlong number) {
+  const Use session(env, number, &Session::drawing);
+  if (!session) return nullptr;
+  auto status = modar::sized<modar_status>();
+  modar_screen_status(session->screen, &status);
+  return java_words(env, {status.state, status.hint, static_cast<jint>(status.pattern) - 1,
+                          status.sound, status.paused, status.captions});
+}
+
+MODAR_NATIVE(void, lookAround)
+(JNIEnv* env, jclass, jlong number, jint pattern, jdouble time_s, jboolean present) {
+  const Use session(env, number, &Session::drawing);
+  if (!session) return;
+  session->events.clear();
+  modar_screen_look_around(session->screen, static_cast<std::uint32_t>(pattern), time_s, present);
+}
+
+MODAR_NATIVE(jboolean, waiting)(JNIEnv* env, jclass, jlong number) {
+  const Use session(env, number, &Session::drawing);
+  return session && modar_screen_waiting(session->screen) != 0 ? JNI_TRUE : JNI_FALSE;
 }
 
 MODAR_NATIVE(void, onDrawFrame)
@@ -806,10 +781,10 @@ MODAR_NATIVE(void, onDrawPlanes)
 }
 
 MODAR_NATIVE(void, onDrawOrbit)
-(JNIEnv* env, jclass, jlong number, jint pattern, jdouble turn, jdouble tilt, jdouble zoom) {
+(JNIEnv* env, jclass, jlong number, jint pattern, jdouble time_s) {
   const Use session(env, number, &Session::drawing);
   if (!session || !can_draw(env, *session) || pattern < 0) return;
-  draw_orbit(*session, static_cast<std::uint32_t>(pattern), turn, tilt, zoom);
+  draw_orbit(*session, static_cast<std::uint32_t>(pattern), time_s);
 }
 
 MODAR_NATIVE(jint, pick)(JNIEnv* env, jclass, jlong number, jfloat x, jfloat y) {
@@ -847,7 +822,7 @@ MODAR_NATIVE(jboolean, label)
   auto label = modar::sized<modar_label>();
   const modar_drawing drawing = drawing_of(*session, look ? session->item_count : 0);
   const float* const view = session->poses.data() + from + kView;
-  if (modar_label_project(session->actions, wanted, &drawing, view, &label) == 0) {
+  if (modar_label_project(session->screen, wanted, &drawing, view, &label) == 0) {
     return JNI_FALSE;
   }
   const auto [x, y] = on_screen(*session, double{label.x}, double{label.y});
@@ -875,16 +850,13 @@ MODAR_NATIVE(jintArray, act)
   std::vector<jint> words;
   for (std::size_t i = 0; i < count; ++i) {
     auto command = modar::sized<modar_command>();
-    modar_actions_command(session->actions, i, &command);
+    modar_screen_command(session->screen, i, &command);
     for (const std::uint32_t word :
          {static_cast<std::uint32_t>(command.kind), command.node, command.action}) {
       words.push_back(static_cast<jint>(word));
     }
   }
-  const auto size = static_cast<jsize>(words.size());
-  const jintArray commands = env->NewIntArray(size);
-  if (commands != nullptr) env->SetIntArrayRegion(commands, 0, size, words.data());
-  return commands;
+  return java_words(env, words);
 }
 
 MODAR_NATIVE(void, ended)(JNIEnv* env, jclass, jlong number, jint node) {
@@ -898,7 +870,7 @@ MODAR_NATIVE(void, resetActions)(JNIEnv* env, jclass, jlong number) {
   const Use session(env, number, &Session::drawing);
   if (!session) return;
   session->events.clear();
-  modar_actions_reset(session->actions);
+  modar_screen_reset(session->screen);
 }
 
 MODAR_NATIVE(jintArray, node)(JNIEnv* env, jclass, jlong number, jint index) {
@@ -909,14 +881,8 @@ MODAR_NATIVE(jintArray, node)(JNIEnv* env, jclass, jlong number, jint index) {
   }
   auto media = modar::sized<modar_media>();
   if (node.media != 0) modar_media_at(session->bundle, node.media - 1, &media);
-  const std::array<jint, 6> words = {node.kind,    static_cast<jint>(node.pattern),
-                                     node.loops,   media.width,
-                                     media.height, media.sound};
-  const jintArray array = env->NewIntArray(static_cast<jsize>(words.size()));
-  if (array != nullptr) {
-    env->SetIntArrayRegion(array, 0, static_cast<jsize>(words.size()), words.data());
-  }
-  return array;
+  return java_words(env, {node.kind, static_cast<jint>(node.pattern), node.loops, media.width,
+                          media.height, media.sound});
 }
 
 MODAR_NATIVE(jobject, media)(JNIEnv* env, jclass, jlong number, jint index) {

@@ -14,8 +14,6 @@
 
 #include <GLES2/gl2.h>
 #include <emscripten.h>
-#include <glm/gtc/matrix_transform.hpp>
-#include <glm/gtc/type_ptr.hpp>
 
 #include "modar/arriving_bundle.hpp"
 #include "modar/modar.h"
@@ -57,7 +55,7 @@ struct Engine {
   uint32_t own_count = 0;
   modar_item* items = nullptr;
   size_t item_count = 0;  ///< that were drawn last
-  modar_actions* actions = nullptr;
+  modar_screen* screen = nullptr;
   modar_event* events = nullptr;                    ///< one a pattern and one a tap
   GLuint* videos = nullptr;                         ///< a node's texture for its video; 0: none
   std::unique_ptr<modar::ArrivingBundle> arriving;  ///< of web_arrive()
@@ -68,52 +66,26 @@ struct Engine {
 };
 Engine engine;
 
-/// The turn and the size that the visitor gave a model: about the place on the pattern where it
-/// stands. place: model space to pattern space.
-glm::mat4 with_gesture(const glm::mat4& place, float turn, float size) {
-  const glm::vec3 foot(place[3].x, place[3].y, 0.0f);
-  glm::mat4 gesture = glm::translate(glm::mat4(1.0f), foot);
-  gesture = glm::rotate(gesture, turn, glm::vec3(0.0f, 0.0f, 1.0f));
-  gesture = glm::scale(gesture, glm::vec3(size));
-  return glm::translate(gesture, -foot) * place;
-}
-
-/// An item with a place on a pattern is moved in front of the eye.
-void put(modar_item& item, uint32_t pattern, float turn, float size) {
-  const PoseFloats& pose = engine.poses[pattern];
-  glm::mat4 place = glm::make_mat4(item.to_eye);
-  if (item.scene != 0) place = with_gesture(place, turn, size);
-  const glm::mat4 to_eye = glm::make_mat4(pose.view) * place;
-  std::memcpy(item.to_eye, glm::value_ptr(to_eye), sizeof item.to_eye);
-  std::memcpy(item.world_to_eye, pose.view, sizeof item.world_to_eye);
-}
-
-/// The content of the visible patterns, as items; answers how many. Pictures
-/// belong to their patterns: a visitor turns and enlarges models alone.
-size_t collect_items(float turn, float size) {
-  const glm::mat4 still(1.0f);
-  size_t count = 0;
-  const size_t room = modar_scene_count(engine.bundle) + modar_node_count(engine.bundle);
-  const uint32_t patterns = modar_pattern_count(engine.bundle);
-  for (uint32_t p = 0; p < patterns; ++p) {
+/// The content of the visible patterns, as items; answers how many.
+size_t collect_items() {
+  const size_t room = modar_scene_count(engine.bundle) + modar_node_count(engine.bundle) + kMostOwn;
+  engine.item_count = 0;
+  for (uint32_t p = 0; p < modar_pattern_count(engine.bundle) + engine.own_count; ++p) {
     if (engine.poses[p].shown == 0.0f) continue;
-    const size_t first = count;
-    count += modar_actions_items(engine.actions, p, glm::value_ptr(still), engine.items + first,
-                                 room - first);
-    for (size_t i = first; i < count; ++i) put(engine.items[i], p, turn, size);
+    engine.item_count +=
+        modar_screen_items(engine.screen, p, engine.poses[p].view, engine.items + engine.item_count,
+                           room - engine.item_count);
   }
+  return engine.item_count;
+}
+
+/// The bundle's pattern that has the content of one of the visitor's own, or itself.
+uint32_t baked_pattern(uint32_t pattern) {
+  const uint32_t patterns = modar_pattern_count(engine.bundle);
+  if (pattern < patterns) return pattern;
   auto scene = modar::sized<modar_scene>();
-  for (uint32_t i = 0; i < engine.own_count; ++i) {
-    if (engine.poses[patterns + i].shown == 0.0f) continue;
-    if (modar_scene_at(engine.bundle, engine.own[i].scene, &scene) == 0) continue;
-    modar_item& item = engine.items[count++] = modar::sized<modar_item>();
-    item.model = scene.model;
-    item.scene = scene.number;
-    std::memcpy(item.to_eye, scene.place, sizeof item.to_eye);
-    put(item, patterns + i, turn, size);
-  }
-  engine.item_count = count;
-  return count;
+  modar_scene_at(engine.bundle, engine.own[pattern - patterns].scene, &scene);
+  return scene.pattern;
 }
 
 /// For web_error(); answers its status.
@@ -387,8 +359,8 @@ EMSCRIPTEN_KEEPALIVE int web_open() {
   for (uint32_t i = 0; i < items; ++i) engine.items[i].size = sizeof(modar_item);
   engine.events = new modar_event[modar_pattern_count(engine.bundle) + 1]();
   engine.videos = new GLuint[modar_node_count(engine.bundle)]();
-  engine.actions = modar_actions_create(engine.bundle, &engine.error);
-  return engine.actions == nullptr ? engine.error.status : 0;
+  engine.screen = modar_screen_create(engine.bundle, &engine.error);
+  return engine.screen == nullptr ? engine.error.status : 0;
 }
 
 /// Of the last function that failed. field: 0 code, 1 where, 2 cause, 3 cure.
@@ -419,13 +391,9 @@ EMSCRIPTEN_KEEPALIVE double web_pattern_width_mm(uint32_t index) {
 /// does.
 EMSCRIPTEN_KEEPALIVE const float* web_bounds(uint32_t pattern) {
   static float bounds[6];
-  const uint32_t patterns = modar_pattern_count(engine.bundle);
-  if (pattern >= patterns) {  // as large as its model's place in the bundle
-    auto scene = modar::sized<modar_scene>();
-    modar_scene_at(engine.bundle, engine.own[pattern - patterns].scene, &scene);
-    pattern = scene.pattern;
-  }
-  return modar_pattern_bounds(engine.bundle, pattern, bounds, bounds + 3) != 0 ? bounds : nullptr;
+  return modar_pattern_bounds(engine.bundle, baked_pattern(pattern), bounds, bounds + 3) != 0
+             ? bounds
+             : nullptr;
 }
 /// Which models are on which patterns. part: 0 pattern, 1 model.
 EMSCRIPTEN_KEEPALIVE uint32_t web_scene(uint32_t index, int part) {
@@ -451,7 +419,7 @@ EMSCRIPTEN_KEEPALIVE double web_focal_sigma() {
 EMSCRIPTEN_KEEPALIVE int web_stand(uint32_t scene) {
   if (engine.own_count == kMostOwn) return 0;
   engine.own[engine.own_count++].scene = scene;
-  return 1;
+  return modar_screen_add_pattern(engine.screen, scene);
 }
 
 /// Takes a record as a further pattern: tracked by the trackers of web_track() from then on.
@@ -476,6 +444,7 @@ EMSCRIPTEN_KEEPALIVE void web_forget_patterns() {
     modar_record_close(engine.own[engine.own_count - 1].record);
     engine.own[engine.own_count - 1] = {};
   }
+  modar_screen_forget_patterns(engine.screen);
   modar_tracker_destroy(engine.tracker);
   engine.tracker = nullptr;
 }
@@ -546,31 +515,65 @@ EMSCRIPTEN_KEEPALIVE void web_widen_luma(uint8_t* gray, size_t count) {
   }
   for (size_t i = 0; i < count; ++i) gray[i] = full[gray[i]];
 }
-/// Mean of every 16th row's every 16th pixel: whether it is dark.
 EMSCRIPTEN_KEEPALIVE double web_brightness(const uint8_t* gray, size_t stride) {
-  double sum = 0;
-  int count = 0;
-  for (int y = 0; y < engine.camera.height; y += 16) {
-    for (int x = 0; x < engine.camera.width; x += 16, ++count)
-      sum += gray[static_cast<size_t>(y) * stride + static_cast<size_t>(x)];
-  }
-  return count == 0 ? 0 : sum / count;
+  return modar_brightness(gray, stride, engine.camera.width, engine.camera.height);
+}
+
+/// As modar_screen_touch(), modar_screen_press() and modar_screen_look_around().
+EMSCRIPTEN_KEEPALIVE int web_touch(int kind, int finger, double x, double y, double width,
+                                   double height) {
+  const modar_touch touch = {sizeof touch, kind, finger, x, y, width, height};
+  return modar_screen_touch(engine.screen, &touch);
+}
+EMSCRIPTEN_KEEPALIVE void web_press(int button, double steps) {
+  modar_screen_press(engine.screen, button, steps);
+}
+EMSCRIPTEN_KEEPALIVE void web_look_around(uint32_t pattern, double time_s, int present) {
+  modar_screen_look_around(engine.screen, pattern, time_s, present);
+}
+/// A frame with the poses in web_poses(), of which the tracker says that.
+EMSCRIPTEN_KEEPALIVE void web_follow(double time_s, const char* reason_text, double brightness) {
+  int reason = MODAR_REASON_CURVED;
+  while (reason > 0 && std::strcmp(modar_reason_text(reason), reason_text) != 0) --reason;
+  uint32_t shown = 0;
+  const uint32_t patterns = modar_pattern_count(engine.bundle) + engine.own_count;
+  while (shown < patterns && engine.poses[shown].shown == 0.0f) ++shown;
+  modar_screen_follow(engine.screen, time_s, shown < patterns ? shown + 1 : 0, reason, brightness);
+}
+/// Six numbers, as modar_status has them.
+EMSCRIPTEN_KEEPALIVE const int* web_status() {
+  static auto status = modar::sized<modar_status>();
+  modar_screen_status(engine.screen, &status);
+  return &status.state;
+}
+/// The visitor's eye on a pattern, without a camera, as web_camera() and web_poses().
+EMSCRIPTEN_KEEPALIVE void web_orbit(uint32_t pattern, int width, int height, double time_s) {
+  auto from = modar::sized<modar_turntable>();
+  auto pose = modar::sized<modar_pose>();
+  modar_screen_turntable(engine.screen, time_s, &from);
+  engine.camera.width = width;
+  engine.camera.height = height;
+  modar_orbit(engine.bundle, baked_pattern(pattern), &from, &engine.camera, &pose);
+  for (uint32_t p = 0; p < modar_pattern_count(engine.bundle) + engine.own_count; ++p)
+    engine.poses[p].shown = 0;
+  engine.poses[pattern].shown = 1;
+  modar_view(&pose, engine.poses[pattern].view);
 }
 
 /// Draws the models of the poses in web_poses() into the canvas, transparent elsewhere, for a frame
-/// of web_camera() that covers the canvas. turn: radians, and size: a factor, of all models.
-EMSCRIPTEN_KEEPALIVE void web_draw(int width, int height, int mirror, float turn, float size) {
+/// of web_camera() that covers the canvas.
+EMSCRIPTEN_KEEPALIVE void web_draw(int width, int height, int mirror) {
   glViewport(0, 0, width, height);
   glClearColor(0.0f, 0.0f, 0.0f, 0.0f);
   glClear(GL_COLOR_BUFFER_BIT);
-  const modar_drawing drawing = drawing_of(collect_items(turn, size));
+  const modar_drawing drawing = drawing_of(collect_items());
   const modar_surface surface = surface_of(width, height, mirror);
   modar_renderer_draw(engine.renderer, &surface, nullptr, &drawing);
 }
 /// The light on the patterns of web_poses(), as a copy of their frame shows it: RGBA.
 EMSCRIPTEN_KEEPALIVE void web_look(const uint8_t* pixels, int width, int height) {
   const modar_picture picture = rgba_picture(pixels, width, height);
-  const modar_drawing drawing = drawing_of(collect_items(0.0f, 1.0f));
+  const modar_drawing drawing = drawing_of(collect_items());
   modar_renderer_observe(engine.renderer, &picture, &drawing);
 }
 /// Names, marks and words of nodes. kind: 0 text, 1 description, 2 title, 3 name, 4 mark.
@@ -645,22 +648,22 @@ EMSCRIPTEN_KEEPALIVE size_t web_act(double time_s, int kind, uint32_t node, uint
     engine.events[count++] = {sizeof(modar_event), MODAR_SEEN, p, 0, 0};
   }
   if (kind >= 0) engine.events[count++] = {sizeof(modar_event), kind, node, material, 0};
-  return modar_actions_step(engine.actions, time_s, engine.events, count);
+  return modar_screen_step(engine.screen, time_s, engine.events, count);
 }
 /// field: 0 kind, 1 node, 2 action.
 EMSCRIPTEN_KEEPALIVE uint32_t web_command(size_t index, int field) {
   auto command = modar::sized<modar_command>();
-  modar_actions_command(engine.actions, index, &command);
+  modar_screen_command(engine.screen, index, &command);
   return field == 0   ? static_cast<uint32_t>(command.kind)
          : field == 1 ? command.node
                       : command.action;
 }
 EMSCRIPTEN_KEEPALIVE int web_acting() {
-  return modar_actions_waiting(engine.actions);
+  return modar_screen_waiting(engine.screen);
 }
 /// Videos show their posters again.
 EMSCRIPTEN_KEEPALIVE void web_forget_acts() {
-  modar_actions_reset(engine.actions);
+  modar_screen_reset(engine.screen);
   for (uint32_t node = 0; node < modar_node_count(engine.bundle); ++node) {
     if (engine.videos[node] == 0) continue;
     modar_renderer_set_video(engine.renderer, node, 0);
@@ -696,7 +699,7 @@ EMSCRIPTEN_KEEPALIVE const float* web_label(uint32_t node, int width, int height
   const modar_drawing drawing = drawing_of(look != 0 ? engine.item_count : 0);
   if (pose.shown == 0.0f) return nullptr;
   const int seen = with_triangles(
-      [&] { return modar_label_project(engine.actions, node, &drawing, pose.view, &label); });
+      [&] { return modar_label_project(engine.screen, node, &drawing, pose.view, &label); });
   if (seen == 0) return nullptr;
   // The frame covers the canvas, its middle in the middle; pixels' centres are whole numbers.
   const double scale = std::fmax(static_cast<double>(width) / engine.camera.width,

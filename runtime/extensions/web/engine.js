@@ -27,6 +27,10 @@ const NEEDS_SIMD = Uint8Array.of(
     0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 8, 1, 6, 0, 65, 0, 253, 15,
     11);
 
+/** As modar.h numbers them. */
+const STATES = /** @type {const} */ (['start', 'looking', 'seen', 'around']);
+const HINTS = /** @type {const} */ (['look', 'far', 'dark', 'blurred', 'outside', 'hold']);
+
 /** Numbers in a pose of Engine.poses(), and where its parts begin; see modar/pose_floats.hpp. */
 export const POSE_FLOATS = 45;
 export const POSE = {
@@ -583,11 +587,73 @@ export class Engine {
   /**
    * @param {number} width
    * @param {number} height
-   * @param {import('./modar-view.js').Gesture} gesture
    */
-  draw(width, height, {mirror = false, turn = 0, size = 1} = {}) {
-    this.#module._web_draw(width, height, mirror ? 1 : 0, turn, size);
+  draw(width, height, mirror = false) { this.#module._web_draw(width, height, mirror ? 1 : 0); }
+
+  /**
+   * As modar_screen_touch() says, of a canvas of that size: 0 nothing, 1 moved, 2 tapped.
+   * @param {number} kind
+   * @param {number} finger
+   * @param {number} x
+   * @param {number} y
+   * @param {number} width
+   * @param {number} height
+   * @returns {number}
+   */
+  touch(kind, finger, x, y, width, height) {
+    return this.#module._web_touch(kind, finger, x, y, width, height);
   }
+
+  /**
+   * As modar_screen_press() says.
+   * @param {number} button
+   * @param {number} steps
+   */
+  press(button, steps) { this.#module._web_press(button, steps); }
+
+  /**
+   * A look without a camera from now on, until forgetActs(): with orbit().
+   * @param {number} pattern
+   * @param {number} time
+   * @param {boolean} presents
+   */
+  lookAround(pattern, time, presents) {
+    this.#module._web_look_around(pattern, time, presents ? 1 : 0);
+  }
+
+  /**
+   * A frame with the poses of poses(), and what the tracker's engine says of it.
+   * @param {number} time
+   * @param {string} reason
+   * @param {number} brightness
+   */
+  follow(time, reason, brightness) {
+    this.#module._web_follow(time, this.#given(reason), brightness);
+  }
+
+  /** @returns {import('./modar-view.js').ViewStatus} */
+  get status() {
+    const m = this.#module;
+    const [state, hint, number, sound, paused, captions] =
+        new Int32Array(m.HEAPU8.buffer, m._web_status(), 6);
+    return {
+      state: STATES[state],
+      hint: HINTS[hint],
+      pattern: number - 1,
+      sound: !!sound,
+      paused: !!paused,
+      captions: !!captions
+    };
+  }
+
+  /**
+   * A pattern as the visitor's eye sees it at a time, in place of a camera's frame.
+   * @param {number} pattern
+   * @param {number} width
+   * @param {number} height
+   * @param {number} time
+   */
+  orbit(pattern, width, height, time) { this.#module._web_orbit(pattern, width, height, time); }
 
   /** Of the last drawing. */
   get triangles() { return this.#module._web_triangles(); }

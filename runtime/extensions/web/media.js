@@ -160,11 +160,7 @@ export class Media {
   #players = new Map();
   /** @type {Set<number>} */
   #wanted = new Set();
-  /**
-   * What the visitor asked for; undefined: nothing yet.
-   * @type {boolean | undefined}
-   */
-  #sound;
+  #sound = false;
   #volume = 1;
   #held = false;
   /**
@@ -213,16 +209,11 @@ export class Media {
     return null;
   }
 
-  /**
-   * tapped: it was the visitor who asked for it, who hears it unless sound was turned off.
-   * @param {number} node
-   * @param {boolean} tapped
-   */
-  play(node, tapped) {
+  /** @param {number} node */
+  play(node) {
     this.#wanted.add(node);
     const player = this.#players.get(node) ?? this.#open(node);
     if (!player.begun) this.#begin(node, player);
-    if (tapped) this.#sound ??= true;
     this.#tune();
     if (!this.#held) player.play();
   }
@@ -315,7 +306,7 @@ export class Media {
     this.#tune();
   }
 
-  get sound() { return this.#sound ?? false; }
+  get sound() { return this.#sound; }
 
   /**
    * 0 to 1.

@@ -22,6 +22,8 @@ const blank = (text) => text.replace(/[^\n]/g, '');
 
 /** A style sheet without comments and blanks, its lines kept. */
 const bareStyle = (css) => css.replace(/\/\*[^]*?\*\//g, blank).replace(/([:;,{}]) +/g, '$1').replace(/ +([{}])/g, '$1').replace(/;(?=\s*\})/g, '');
+/** The same in a script: its lines are joined, and stay lines of the source. */
+const scriptStyle = (css) => bareStyle(css).replace(/([;{},])((?:\n *)+)/g, (_, end, lines) => end + lines.replace(/\n/g, '\\\n'));
 /** The style sheets in a script. */
 const STYLES = /(?<=^export const [A-Z]+ = `\n):(?:root|host)[^`]*(?=`;)/gm;
 
@@ -40,7 +42,7 @@ const NOTHING = { lines: [], from: [] };
 function joined(file, seen, shared, entry = false) {
   if (seen.has(file)) return NOTHING;
   seen.add(file);
-  const text = read(file).replace(STYLES, bareStyle);
+  const text = read(file).replace(STYLES, scriptStyle);
   let before = NOTHING;
   for (const [, names, other] of text.matchAll(IMPORT)) {
     if (other !== SHARED) before = join2(before, joined(join(dirname(file), other), seen, shared));
@@ -56,6 +58,10 @@ function bundle(file) {
   const all = joined(file, new Set(), shared, true);
   return join2({ lines: [`import { ${[...shared].join(', ')} } from './${SHARED}';`], from: [null] }, all);
 }
+
+/** Emscripten writes a function for each export, which replaces itself when it is called: one loop does it. */
+const bareEngine = (text) => text.replace(/var _web_\w+ = Module\["_web_\w+"\] = function\(\) \{\n[^\n]*\n\};\n/g, '')
+  .replace("Module['asm'] = exports;", "$&\nfor (const name in exports) Module['_' + name] = exports[name];");
 
 const DIGITS = 'ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/';
 
@@ -91,7 +97,8 @@ async function main([folder, ...files]) {
       writeFileSync(join(folder, name), bareStyle(read(file)).replace(/\s*\n\s*/g, '\n').trim());
       continue;
     }
-    const before = BUNDLED.includes(name) ? bundle(file) : script(file, read(file).replace(STYLES, bareStyle));
+    const text = name.startsWith('engine-') ? bareEngine(read(file)) : read(file).replace(STYLES, scriptStyle);
+    const before = BUNDLED.includes(name) ? bundle(file) : script(file, text);
     const sourceMap = hasMap(name) && { content: mapOf(before), includeSources: true, url: `${name}.map` };
     // A service worker is no module, and the line that `modar web` writes before it keeps its name.
     const { code, map } = await minify({ [name]: before.lines.join('\n') }, { ...OPTIONS, module: name !== 'sw.js', sourceMap });

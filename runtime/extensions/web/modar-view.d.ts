@@ -1,13 +1,25 @@
 /** Draws what modar.js sees: the frame in one canvas, the bundle's models over it in another. */
 import type { Frame, Modar } from './modar.js';
 
-/** How the models of all patterns are changed. */
 export interface Gesture {
   /** The picture and the models left to right, as a mirror shows them. */
   mirror?: boolean;
-  /** About the pattern's normal, radians. */
-  turn?: number;
-  size?: number;
+}
+
+/** The visitor's view of the scenes. */
+export interface ViewStatus {
+  /** start: no frame came. looking, seen: the last frame of draw(). around: lookAround(). */
+  state: 'start' | 'looking' | 'seen' | 'around';
+  /** What helps while nothing is seen: to look for the picture, go closer, have light, move slowly, turn back to it, hold still. */
+  hint: 'look' | 'far' | 'dark' | 'blurred' | 'outside' | 'hold';
+  /** The one whose words are shown, for a second after it went; -1: none. */
+  pattern: number;
+  /** Videos and sounds are heard: after press(4), and after a tap on what plays. */
+  sound: boolean;
+  /** They wait: press(5). */
+  paused: boolean;
+  /** Captions are wanted: press(6). */
+  captions: boolean;
 }
 
 /** A named part of a pattern's content. */
@@ -83,7 +95,24 @@ export class View extends EventTarget {
   tap(x: number, y: number): number | null;
   /** The visitor tapped a node, as by a label's own button. */
   tapNode(node: number): void;
-  /** Actions begin anew, and videos and sounds stop. */
+  /**
+   * A pointer on the canvas of the models. kind: 0 down, 1 moved, 2 up, 3 cancelled. x, y: CSS pixels from its top left. One
+   * turns and tilts, two resize. Answers whether it tapped: see tap().
+   */
+  touch(kind: 0 | 1 | 2 | 3, finger: number, x: number, y: number): boolean;
+  /**
+   * A key or button. button: 0 turns, 1 tilts, 2 resizes, by steps of 10 degrees or a tenth, which may be negative, or parts; 3
+   * resets; 4 sound, 5 pause and 6 captions are on or off. Turn sound on in a visitor's click: it is off at first.
+   */
+  press(button: 0 | 1 | 2 | 3 | 4 | 5 | 6, steps?: number): void;
+  readonly status: ViewStatus;
+  /** The content of a pattern without a camera, until forgetActs(): touch() and press() move the eye. presents: it goes once around at first. */
+  lookAround(pattern: number, presents?: boolean): void;
+  /** Draws lookAround() anew, in another size. */
+  turned(): void;
+  /** Of lookAround(), as drawFrom() takes it. */
+  readonly eye: { view: Float32Array; focal: number };
+  /** Actions begin anew, models are as baked, and videos and sounds stop. */
   forgetActs(): void;
   /** For captions, of what plays from now on: the first of these that a video or sound has, else any. */
   set languages(languages: string[]);
@@ -91,12 +120,8 @@ export class View extends EventTarget {
   captionsOf(node: number): { language: string; captions: string; transcript: string } | null;
   /** 0 to 1; iPhones know their own alone. */
   set volume(volume: number);
-  /** Videos and sounds are silent until this is true: set it on a visitor's click. A tap on what plays a sound sets it, too. */
-  sound: boolean;
   /** The sound of videos and sounds as a stream, heard or not, for a film; null where the bundle has none. Ask in a click's handler. */
   readonly film: MediaStream | null;
-  /** While this is true, videos and sounds pause. */
-  held: boolean;
   /** Labels on the screen, CSS pixels of the canvas; covered: something is in front of its point. */
   labels(): { node: number; x: number; y: number; covered: boolean }[];
   /** Both canvases in one picture. */

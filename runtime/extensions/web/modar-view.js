@@ -122,6 +122,8 @@ export class View extends EventTarget {
   #framesSinceLook = LIGHT_EVERY;
   #redraw = () => {};
   #mirror = false;
+  /** The pattern that is looked at without a camera; -1: none. */
+  #around = -1;
   /** Of media.js, which is loaded where a bundle has videos or sounds. */
   #media = /** @type {Media} */ (/** @type {unknown} */ ({
     sound: false,
@@ -358,9 +360,69 @@ export class View extends EventTarget {
    */
   tapNode(node) { this.#tapped({node, material: 0}); }
 
+  /**
+   * @see modar-view.d.ts
+   * @param {0 | 1 | 2 | 3} kind
+   * @param {number} finger
+   * @param {number} x
+   * @param {number} y
+   */
+  touch(kind, finger, x, y) {
+    const {clientWidth, clientHeight} = this.#models;
+    const done = this.#engine.touch(kind, finger, x, y, clientWidth, clientHeight);
+    if (done === 1) this.turned();
+    return done === 2;
+  }
+
+  /**
+   * @see modar-view.d.ts
+   * @param {0 | 1 | 2 | 3 | 4 | 5 | 6} button
+   */
+  press(button, steps = 1) {
+    this.#engine.press(button, steps);
+    this.#tune();
+    if (button < 4) this.turned();
+  }
+
+  get status() { return this.#engine.status; }
+
+  #tune() {
+    const {sound, paused} = this.status;
+    if (this.#media.sound !== sound) this.#media.sound = sound;
+    if (this.#media.held !== paused) this.#media.held = paused;
+  }
+
+  /**
+   * @see modar-view.d.ts
+   * @param {number} pattern
+   */
+  lookAround(pattern, presents = true) {
+    this.forgetActs();
+    this.#engine.lookAround(pattern, performance.now() / 1000, presents);
+    this.#around = pattern;
+    this.#mirror = false;
+    this.turned();
+  }
+
+  /** Without a camera, the view is drawn anew; a camera's next frame shows it anyway. */
+  turned() {
+    if (this.#around >= 0) this.#again();
+  }
+
+  /** @see modar-view.d.ts */
+  get eye() {
+    const at = this.#around * POSE_FLOATS + POSE.view;
+    const {clientWidth, width} = this.#models;
+    return {
+      view: this.#engine.poses().slice(at, at + 16),
+      focal: (this.#engine.focal * clientWidth) / width
+    };
+  }
+
   /** Actions begin anew, as if nothing had been found; videos and sounds stop. */
   forgetActs() {
     this.#taps = [];
+    this.#around = -1;
     cancelAnimationFrame(this.#handle);
     this.#handle = 0;
     this.#engine.forgetActs();
@@ -386,23 +448,10 @@ export class View extends EventTarget {
   set volume(volume) { this.#media.volume = volume; }
 
   /**
-   * Videos and sounds are silent until this is true: set by a visitor's click, or where one taps
-   * what plays a sound.
-   */
-  set sound(on) { this.#media.sound = on; }
-
-  get sound() { return this.#media.sound; }
-
-  /**
    * The sound of videos and sounds, for a film; null where the bundle has none. Asked for in a
    * click's handler.
    */
   get film() { return this.#plays ? this.#media.film : null; }
-
-  /** While this is true, videos and sounds pause. */
-  set held(on) { this.#media.held = on; }
-
-  get held() { return this.#media.held; }
 
   /** The labels that are on the screen: [{node, x, y, covered}], CSS pixels of the canvas. */
   labels() {
@@ -433,6 +482,12 @@ export class View extends EventTarget {
 
   /** Acts and repeats the last drawing. */
   #again() {
+    if (this.#around >= 0) {
+      const {width, height} = fitCanvases(this.#models, this.#picture);
+      if (this.#lost || this.#empty) return;
+      this.#engine.orbit(this.#around, width, height, performance.now() / 1000);
+      this.#redraw = () => this.#engine.draw(width, height);
+    }
     const poses = this.#engine.poses().slice();
     /** @type {(since: Float32Array, most: number) => boolean} */
     const moved = (since, most) =>
@@ -466,8 +521,10 @@ export class View extends EventTarget {
       ...this.#media.ended.splice(0).map((node) => ({node, ended: true})), ...this.#taps.splice(0)
     ];
     for (const event of happened.length ? happened : [null]) {
-      for (const todo of this.#engine.act(performance.now() / 1000, event)) {
-        if ('play' in todo) this.#media.play(todo.play, event !== null && !event.ended);
+      const all = this.#engine.act(performance.now() / 1000, event);
+      this.#tune();
+      for (const todo of all) {
+        if ('play' in todo) this.#media.play(todo.play);
         else if ('pause' in todo) this.#media.pause(todo.pause);
         else if ('link' in todo) this.#tell('link', {address: todo.link});
         else this.#tell('text', {node: todo.text});
@@ -484,7 +541,6 @@ export class View extends EventTarget {
 
   #drawn() {
     this.#drawnAt = performance.now();
-    if (this.nodes.length === 0) return;
     ++this.#drawings;
     this.dispatchEvent(new Event('drawn'));
     if (this.#engine.acting) this.#handle ||= requestAnimationFrame(() => this.#goOn());
@@ -496,7 +552,7 @@ export class View extends EventTarget {
    */
   #goOn(fresh = false) {
     this.#handle = 0;
-    if (performance.now() - this.#drawnAt > STILL_MS) this.#again();
+    if (this.#around >= 0 || performance.now() - this.#drawnAt > STILL_MS) this.#again();
     else if (fresh || this.#taps.length || this.#engine.acting)
       this.#handle = requestAnimationFrame(() => this.#goOn(fresh));
   }
@@ -551,21 +607,21 @@ export class View extends EventTarget {
   }
 
   /**
-   * frame: the detail of modar.js's event. gesture: {mirror, turn (radians), size}.
+   * frame: the detail of modar.js's event. gesture: {mirror}.
    * @param {Frame} frame
    * @param {Gesture} gesture
    */
-  draw({source, camera, poses}, gesture = {}) {
+  draw({source, camera, poses, reason, brightness}, gesture = {}) {
     const {width, height} = fitCanvases(this.#models, this.#picture);
     drawFrame(this.#picture, {source, camera}, gesture);
     if (this.#lost || this.#empty) return;
     this.#engine.setCamera(camera.width, camera.height, camera.focal);
     const known = this.#engine.poses();
     known.fill(0).set(poses.subarray(0, known.length));
+    this.#engine.follow(performance.now() / 1000, reason, brightness);
     if (!this.#fixedLight) this.#look(source, camera, poses);
-    const as = {...gesture};
-    this.#mirror = as.mirror ?? false;
-    this.#redraw = () => this.#engine.draw(width, height, as);
+    const mirror = this.#mirror = gesture.mirror ?? false;
+    this.#redraw = () => this.#engine.draw(width, height, mirror);
     this.#again();
   }
 

@@ -6,22 +6,10 @@ import {Camera, hostApp, ownBrowser} from './camera.js';
 import {ModarError, POSE, POSE_FLOATS} from './engine.js';
 import {allowMotion, load} from './modar.js';
 import {View} from './modar-view.js';
-import {Turntable} from './turntable.js';
+import {groundTransform} from './turntable.js';
 import {build} from './viewer-parts.js';
 import {directionOf, fill, labelOf, showWords, wordsFor} from './viewer-words.js';
 
-/** Milliseconds without a detection before the visitor sees a reason: shorter ones flicker. */
-const PATIENCE_MS = 900;
-/** Milliseconds of searching after which "go closer" is the likeliest advice. */
-const FAR_MS = 5000;
-/** Mean gray value below which a room is called dark. */
-const DARK = 35;
-const TURN_A_KEY = Math.PI / 18;
-const SIZE_A_KEY = 1.1;
-/** How far a finger may slip that taps, CSS pixels. */
-const TAP_PIXELS = 6;
-const SMALLEST = 0.2;
-const LARGEST = 5;
 /** Pictures that a hint has room for. */
 const MOST_PLATES = 4;
 
@@ -120,9 +108,6 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
   /** @type {ViewerPattern[] | null} */
   #patternsGiven = null;
   #camera = new Camera();
-  /** @type {Turntable | null} */
-  #table = null;
-  #gesture = {turn: 0, size: 1, mirror: false};
   #shown = -1;
   /** The label has a node's words, not its pattern's. */
   #noted = false;
@@ -138,7 +123,6 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
    * @type {Map<number, string>}
    */
   #cues = new Map();
-  #unseenSince = 0;
   /** What the visitor has asked for last. */
   #again = () => this.start();
 
@@ -387,7 +371,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
     this.#followRest(view);
     opened.addEventListener('frame', ({detail}) => this.#onFrame(detail));
     opened.addEventListener('dropped', ({detail}) => {
-      if (this.#camera.stream) view.show(detail.source, this.#gesture);
+      if (this.#camera.stream) view.show(detail.source, {mirror: this.#camera.mirrored});
     });
     opened.addEventListener('error', ({detail}) => this.fail(detail));
     for (const type of /** @type {const} */ (['found', 'updated', 'lost'])) {
@@ -460,7 +444,6 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       await Promise.all([loaded, this.#ready]);
       if (!this.isConnected) return this.stop();
       await this.#follow();
-      this.#unseenSince = performance.now();
       this.#$('reason').textContent = this.#lookWords;
       this.#enter('looking', -1);
     } catch (error) { this.fail(error); } finally {
@@ -477,7 +460,6 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
       if (!this.isConnected) return;
       this.#$('which').hidden = this.patterns.length < 2;
       this.#enter('around', pattern);
-      this.#table = new Turntable(this.#view, this.#$('ground'));
       await this.#turnScene(pattern);
     } catch (error) { this.fail(error); } finally {
       this.#setBusy(false);
@@ -487,9 +469,7 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
   /** Back to the cover. */
   stop() {
     this.#closeCamera();
-    this.#table?.close();
-    this.#table = null;
-    this.#$('which').hidden = true;
+    this.#$('which').hidden = this.#$('ground').hidden = true;
     if (this.#root.fullscreenElement) document.exitFullscreen();
     this.#$('stage').close();
     if (this.#$('leave').open) this.#$('leave').close();
@@ -590,7 +570,6 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     await this.#camera.open(
         this.#$('video'),
         () => this.fail(new ModarError({code: 'web.ended', cause: 'the camera ended'})));
-    this.#gesture.mirror = this.#camera.mirrored;
     performance.mark('modar: camera');
     this.dispatchEvent(new Event('camerachange'));
   }
@@ -659,35 +638,30 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
 
   // ---- a look without a camera ----
 
-  #onResize = () => this.#table?.draw();
+  #onResize = () => this.#view?.turned();
 
   /** @param {number} pattern */
   async #turnScene(pattern) {
     const picture = this.patterns[pattern];
     this.#$('scene').value = `${pattern}`;
-    Object.assign(
-        this.#$('ground'),
-        {width: picture.width, height: picture.height, src: await pictureOf(picture)});
-    this.#view?.forgetActs();
-    this.#table?.show(pattern, picture);
+    const {width, height, flat} = picture;
+    const src = await pictureOf(picture);
+    if (this.#state !== 'around') return;
+    Object.assign(this.#$('ground'), {width, height, src, hidden: flat === false});
+    this.#view.lookAround(pattern, !matchMedia('(prefers-reduced-motion: reduce)').matches);
+  }
+
+  /** The picture below the content. */
+  #layGround() {
+    const {view, focal} = this.#view.eye;
+    const {clientWidth: width, clientHeight: height} = this.#$('screen');
+    const numbers = groundTransform(view, focal, {width, height}, this.patterns[this.#shown]);
+    this.#$('ground').style.transform = `matrix3d(${numbers.join()})`;
   }
 
   // ---- frames ----
 
   get #lookWords() { return this.#say(this.patterns.length > 1 ? 'lookMany' : 'look'); }
-
-  /**
-   * @param {Frame} frame
-   * @param {number} unseenMs
-   */
-  #adviceFor({reason, brightness}, unseenMs) {
-    if (brightness < DARK) return this.#say('dark');
-    if (unseenMs < PATIENCE_MS) return this.#$('reason').textContent ?? '';
-    if (reason === 'lost by blur') return this.#say('blurred');
-    if (reason === 'out of view') return this.#say('outside');
-    if (reason === 'failed verification') return this.#say('hold');
-    return unseenMs > FAR_MS ? `${this.#lookWords} ${this.#say('far')}` : this.#lookWords;
-  }
 
   /** @param {string} name */
   #nameModels(name) { this.#$('models').setAttribute('aria-label', name); }
@@ -786,26 +760,15 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
 
   #useLanguages() { this.#view.languages = this.#languages; }
 
-  /**
-   * Sound comes by a visitor's own click or tap only, and what plays can be paused.
-   * @param {string} id
-   * @param {(on: boolean) => void} set
-   */
-  #press(id, set) {
-    const on = this.#$(id).getAttribute('aria-pressed') !== 'true';
-    this.#$(id).setAttribute('aria-pressed', String(on));
-    set(on);
-  }
-
   /** @param {View} view */
   #listenToScenes(view) {
     this.#$('media').hidden = !view.nodes.some(({kind}) => kind === 'video' || kind === 'sound');
     this.#$('captions').hidden = !view.nodes.some((_, node) => view.captionsOf(node));
-    this.#$('pause').setAttribute('aria-pressed', 'false');
     this.#useLanguages();
     this.#cues.clear();
     view.addEventListener('drawn', () => {
       if (this.#state !== 'start') this.#showMarks();
+      if (this.#state === 'around' && this.#shown >= 0) this.#layGround();
     });  // a last frame may come late
     view.addEventListener('caption', ({detail}) => this.#caption(detail));
     view.addEventListener('text', ({detail: {node}}) => {
@@ -831,19 +794,18 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
   #caption({node, text, language}) {
     this.#cues.delete(node);
     if (text) this.#cues.set(node, text);
-    const shown = this.#$('captions').getAttribute('aria-pressed') === 'true';
     Object.assign(this.#$('cue'), {
-      textContent: shown ? [...this.#cues.values()].join('\n') : '',
+      textContent: this.#view.status.captions ? [...this.#cues.values()].join('\n') : '',
       lang: language,
       dir: 'auto'
     });
   }
 
-  /** Its pressed state: a tap on what plays a sound turns it on. */
-  #showSound() {
-    const {sound} = this.#view;
-    if (this.#$('volume').hidden !== sound) return;
-    this.#$('sound').setAttribute('aria-pressed', String(sound));
+  /** Pressed states: a tap on what plays a sound turns it on. */
+  #showSwitches() {
+    const {sound, paused, captions} = this.#view.status;
+    for (const [id, on] of Object.entries({sound, pause: paused, captions}))
+      this.#$(id).setAttribute('aria-pressed', String(on));
     this.#$('volume').hidden = !sound;
   }
 
@@ -869,7 +831,7 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     }
     for (const button of buttons.values()) button.remove();
     this.#clearMarks();
-    if (this.#view) this.#showSound();
+    if (this.#view) this.#showSwitches();
   }
 
   /** @param {number} node */
@@ -889,23 +851,12 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     return button;
   }
 
-  /**
-   * A tapped node acts, and the label is the pattern's again.
-   * @param {HTMLCanvasElement} canvas
-   * @param {MouseEvent} place
-   */
-  #tap(canvas, {clientX, clientY}) {
-    const {left, top} = canvas.getBoundingClientRect();
-    this.#view?.tap(clientX - left, clientY - top);
-    if (this.#noted) this.#showLabel(this.#shown);
-  }
-
   /** @param {Frame} frame */
   #onFrame(frame) {
     if (!this.#camera.stream) return;
     if (this.#state === 'looking' && frame.reason === 'visible') performance.mark('modar: tracked');
     try {
-      this.#view.draw(frame, this.#gesture);
+      this.#view.draw(frame, {mirror: this.#camera.mirrored});
     } catch (error) {
       this.fail(error);
       return;
@@ -913,125 +864,62 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     this.#camera.copied(frame.copyMs);
     if (frame.foundFocal)
       this.#camera.keepFocal(frame.foundFocal, Math.max(frame.camera.width, frame.camera.height));
-    this.#tellSeen(frame);
+    this.#tellSeen();
     this.dispatchEvent(new CustomEvent('frame', {detail: frame}));
   }
 
-  /** @param {Frame} frame */
-  #tellSeen(frame) {
-    const now = performance.now();
-    const first =
-        this.#modar.patterns.findIndex((_, p) => frame.poses[p * POSE_FLOATS + POSE.shown] !== 0);
-    if (first >= 0) {
-      if (this.#state !== 'seen') performance.mark('modar: seen');
-      this.#unseenSince = now;
-      this.#setState('seen');
-      if (first !== this.#shown) this.#showScene(first);
-    } else {
-      this.#setState('looking');
-      setText(this.#$('reason'), this.#adviceFor(frame, now - this.#unseenSince));
-      if (now - this.#unseenSince > PATIENCE_MS && this.#shown >= 0) this.#showScene(-1);
-    }
+  #tellSeen() {
+    const {state, hint, pattern} = this.#view.status;
+    if (state === 'seen' && this.#state !== state) performance.mark('modar: seen');
+    this.#setState(state);
+    const far = hint === 'far' ? ` ${this.#say(hint)}` : '';
+    if (state === 'looking')
+      setText(this.#$('reason'), hint === 'look' || far ? this.#lookWords + far : this.#say(hint));
+    if (pattern !== this.#shown) this.#showScene(pattern);
   }
 
   // ---- gestures and keys ----
 
-  /**
-   * What a visitor's hand moves: models before the camera at the next frame, the turntable at
-   * once.
-   * @param {(held: {turn: number, size: number}) => void} by
-   */
-  #change(by) {
-    by(this.#table?.gesture ?? this.#gesture);
-    this.#table?.touched();
-  }
-
-  /** @param {number} radians */
-  #turn(radians) {
-    this.#change((held) => {
-      held.turn += radians;
-    });
-  }
-
-  /** @param {number} factor */
-  #resize(factor) {
-    this.#change((held) => {
-      held.size = Math.min(LARGEST, Math.max(SMALLEST, held.size * factor));
-    });
-  }
-
-  /**
-   * Of the turntable alone: before the camera, the visitor walks.
-   * @param {number} radians
-   */
-  #tilt(radians) {
-    if (!this.#table) return;
-    this.#table.gesture.tilt += radians;
-    this.#table.touched();
-  }
-
-  #undo() {
-    Object.assign(this.#gesture, {turn: 0, size: 1});
-    this.#table?.reset();
+  /** @param {0 | 1 | 2 | 3 | 4 | 5 | 6} button */
+  #presses(button, steps = 1) {
+    return () => {
+      this.#view.press(button, steps);
+      this.#showSwitches();
+      if (button === 6) this.#caption({node: -1, language: this.#$('cue').lang});
+    };
   }
 
   /** @type {Record<string, () => void>} */
   #keys = {
-    ArrowLeft: () => this.#turn(-TURN_A_KEY),
-    ArrowRight: () => this.#turn(TURN_A_KEY),
-    ArrowUp: () => this.#resize(SIZE_A_KEY),
-    ArrowDown: () => this.#resize(1 / SIZE_A_KEY),
-    PageUp: () => this.#tilt(TURN_A_KEY),
-    PageDown: () => this.#tilt(-TURN_A_KEY),
-    '+': () => this.#resize(SIZE_A_KEY),
-    '-': () => this.#resize(1 / SIZE_A_KEY),
-    0: () => this.#undo(),
+    ArrowLeft: this.#presses(0, -1),
+    ArrowRight: this.#presses(0),
+    ArrowUp: this.#presses(2),
+    ArrowDown: this.#presses(2, -1),
+    PageUp: this.#presses(1),
+    PageDown: this.#presses(1, -1),
+    '+': this.#presses(2),
+    '-': this.#presses(2, -1),
+    0: this.#presses(3),
     Escape: () => this.stop(),
   };
 
   /** @param {HTMLCanvasElement} canvas */
   #listenToGestures(canvas) {
-    /** @type {Map<number, {x: number, y: number}>} */
-    const fingers = new Map();
-    const spread = () => {
-      const [a, b] = [...fingers.values()];
-      return Math.hypot(a.x - b.x, a.y - b.y);
-    };
-    /**
-     * Where one finger came down that has not moved.
-     * @type {{x: number, y: number} | null}
-     */
-    let tap = null;
-    canvas.addEventListener('pointerdown', (event) => {
-      canvas.setPointerCapture(event.pointerId);
-      fingers.set(event.pointerId, {x: event.clientX, y: event.clientY});
-      tap = fingers.size === 1 ? {x: event.clientX, y: event.clientY} : null;
-    });
-    canvas.addEventListener('pointermove', (event) => {
-      const finger = fingers.get(event.pointerId);
-      if (!finger) return;
-      if (tap && Math.hypot(event.clientX - tap.x, event.clientY - tap.y) > TAP_PIXELS) tap = null;
-      if (tap) return;
-      const before = fingers.size === 2 ? spread() : 0;
-      // Across the whole canvas: one turn.
-      if (fingers.size === 1) {
-        this.#turn(((event.clientX - finger.x) / canvas.clientWidth) * 2 * Math.PI);
-        this.#tilt(((event.clientY - finger.y) / canvas.clientHeight) * Math.PI);
-      }
-      finger.x = event.clientX;
-      finger.y = event.clientY;
-      if (before > 0) this.#resize(spread() / before);
-    });
-    for (const type of /** @type {const} */ (['pointerup', 'pointercancel'])) {
+    const kinds = ['pointerdown', 'pointermove', 'pointerup', 'pointercancel'];
+    for (const [kind, type] of kinds.entries()) {
       canvas.addEventListener(type, (event) => {
-        fingers.delete(event.pointerId);
-        if (tap && type === 'pointerup') this.#tap(canvas, event);
-        tap = null;
+        const {pointerId, clientX, clientY} = /** @type {PointerEvent} */ (event);
+        if (kind === 0) canvas.setPointerCapture(pointerId);
+        const {left, top} = canvas.getBoundingClientRect();
+        const [x, y] = [clientX - left, clientY - top];
+        if (!this.#view?.touch(/** @type {0 | 1 | 2 | 3} */ (kind), pointerId, x, y)) return;
+        this.#view.tap(x, y);
+        if (this.#noted) this.#showLabel(this.#shown);  // the pattern's again
       });
     }
     canvas.addEventListener('wheel', (event) => {
       event.preventDefault();
-      this.#resize(Math.exp(-event.deltaY / 500));
+      this.#view?.press(2, -event.deltaY / 50);
     }, {passive: false});
   }
 
@@ -1060,17 +948,10 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
       'problem-close': () => this.#$('problem').close(),
       'leave-open': () => this.#$('leave').close(),
       'leave-close': () => this.#$('leave').close(),
-      sound: () => {
-        this.#view.sound = !this.#view.sound;
-        this.#showSound();
-      },
-      pause: () => this.#press(
-          'pause',
-          (on) => {
-            this.#view.held = on;
-          }),
-      captions: () =>
-          this.#press('captions', () => this.#caption({node: -1, language: this.#$('cue').lang})),
+      // Sound comes by a visitor's own click or tap only, and what plays can be paused.
+      sound: this.#presses(4),
+      pause: this.#presses(5),
+      captions: this.#presses(6),
       'label-close': () => {
         this.#fold(true, true);
         this.#$('label-open').focus();

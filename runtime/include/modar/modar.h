@@ -258,6 +258,9 @@ int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t strid
  * time. out has (width / factor) * (height / factor) bytes, and may be `gray`. */
 void modar_shrink(const uint8_t* gray, size_t stride, int width, int height, int factor,
                   uint8_t* out);
+/* The mean of some pixels of a gray picture, 0 to 255. */
+MODAR_EXPERIMENTAL double modar_brightness(const uint8_t* gray, size_t stride, int width,
+                                           int height);
 /* The camera's rotation from the last frame to the next one, from a gyroscope: a rotation vector in
  * radians, in the camera's axes (x right, y down, z forward; those of a phone's sensors differ).
  * Helps `extended`. */
@@ -329,12 +332,12 @@ void modar_projection(const modar_camera* camera, double near_plane, double far_
 /* From where modar_orbit() looks. */
 typedef struct modar_turntable {
   size_t size;
-  double turn; /* radians about the pattern's normal */
-  double tilt; /* radians above its plane */
+  double turn; /* radians by which the content is turned about the pattern's normal */
+  double tilt; /* radians of the eye above its plane */
   double zoom; /* 1: all fits; 2: twice as large */
 } modar_turntable;
 /* A view without a camera: the pose of a pattern for a camera that goes around its content and
- * shows all of it (without content: the pattern). Sets the focal length and centre of `camera`,
+ * shows all of it and of the pattern. Sets the focal length and centre of `camera`,
  * which has the size of the picture, and `pose`. Returns 0 and changes nothing for an invalid
  * index or size. */
 MODAR_EXPERIMENTAL int modar_orbit(const modar_bundle* bundle, uint32_t pattern,
@@ -531,13 +534,91 @@ MODAR_EXPERIMENTAL int modar_media_at(const modar_bundle* bundle, uint32_t index
 MODAR_EXPERIMENTAL void modar_renderer_set_video(modar_renderer* renderer, uint32_t node,
                                                  uint32_t texture);
 
-/* The state of a bundle's nodes, and what actions have done to them. */
-typedef struct modar_actions modar_actions;
-MODAR_EXPERIMENTAL modar_actions* modar_actions_create(const modar_bundle* bundle,
-                                                       modar_error* error);
-MODAR_EXPERIMENTAL void modar_actions_destroy(modar_actions* actions);
-/* As at the start: nothing was found. */
-MODAR_EXPERIMENTAL void modar_actions_reset(modar_actions* actions);
+/* The screen: the state of a bundle's nodes, as actions have left them, and of the models, as the
+ * visitor's hand has. */
+typedef struct modar_screen modar_screen;
+MODAR_EXPERIMENTAL modar_screen* modar_screen_create(const modar_bundle* bundle,
+                                                     modar_error* error);
+MODAR_EXPERIMENTAL void modar_screen_destroy(modar_screen* screen);
+/* As at the start: nothing was found, and models are as baked. Switches stay. */
+MODAR_EXPERIMENTAL void modar_screen_reset(modar_screen* screen);
+
+enum {
+  MODAR_TOUCH_DOWN = 0,
+  MODAR_TOUCH_MOVE = 1,
+  MODAR_TOUCH_UP = 2,
+  MODAR_TOUCH_CANCEL = 3, /* it went, and was no tap */
+};
+typedef struct modar_touch {
+  size_t size;
+  int kind;
+  int finger;  /* any number that it keeps while it is down; a mouse is a finger, too */
+  double x, y; /* from the top left of the screen, which is `width` times `height` large: at least 1
+                  each, in any unit */
+  double width, height;
+} modar_touch;
+enum {
+  MODAR_NOTHING = 0,
+  MODAR_MOVED = 1,  /* draw anew */
+  MODAR_TAPPED = 2, /* modar_pick() there tells what */
+};
+/* A finger across the screen turns models once around, along it half around above the pattern
+ * (without a camera only: before one, visitors walk); two fingers resize, from a fifth to five
+ * times. Returns MODAR_NOTHING, MODAR_MOVED or MODAR_TAPPED. */
+MODAR_EXPERIMENTAL int modar_screen_touch(modar_screen* screen, const modar_touch* touch);
+enum {
+  MODAR_TURN = 0, /* by 10 degrees a step */
+  MODAR_TILT = 1, /* the same, upward */
+  MODAR_SIZE = 2, /* by a tenth a step */
+  MODAR_RESET = 3,
+  MODAR_SOUND = 4, /* on or off, as the next two; no steps */
+  MODAR_PAUSED = 5,
+  MODAR_CAPTIONS_SHOWN = 6,
+};
+/* A key or a button. steps: presses, or parts of one; negative ones in the other direction. */
+MODAR_EXPERIMENTAL void modar_screen_press(modar_screen* screen, int button, double steps);
+/* A look without a camera from now on, until modar_screen_reset(): gestures move the eye, and
+ * modar_screen_items() leaves models as baked. present: 1: in the first four seconds it goes once
+ * around. time_s: seconds. */
+MODAR_EXPERIMENTAL void modar_screen_look_around(modar_screen* screen, uint32_t pattern,
+                                                 double time_s, int present);
+/* A frame of a camera. number: of the first pattern that is shown, its index + 1; 0: none, because
+ * of modar_tracker_reason(). brightness: modar_brightness() of the frame. time_s: seconds. */
+MODAR_EXPERIMENTAL void modar_screen_follow(modar_screen* screen, double time_s, uint32_t number,
+                                            int reason, double brightness);
+enum {
+  MODAR_STATE_START = 0,
+  MODAR_STATE_LOOKING = 1, /* for patterns, in a camera's frames */
+  MODAR_STATE_SEEN = 2,    /* one is shown */
+  MODAR_STATE_AROUND = 3,  /* without a camera */
+};
+/* What to tell a visitor who looks for a pattern. */
+enum {
+  MODAR_HINT_LOOK = 0, /* what to look for */
+  MODAR_HINT_CLOSER = 1,
+  MODAR_HINT_DARK = 2, /* turn on a light */
+  MODAR_HINT_BLURRED = 3,
+  MODAR_HINT_OUTSIDE = 4, /* it left the frame */
+  MODAR_HINT_HOLD = 5,    /* hold still, and face it */
+};
+typedef struct modar_status {
+  size_t size;
+  int state;
+  int hint;         /* changes when nothing was shown for a second, so that it can be read */
+  uint32_t pattern; /* number of the pattern whose words are shown, for a second after it went; 0:
+                       none */
+  int sound;        /* 1: videos and sounds are heard: the visitor asked, or tapped what plays */
+  int paused;       /* 1: they wait */
+  int captions;     /* 1: shown */
+} modar_status;
+MODAR_EXPERIMENTAL void modar_screen_status(const modar_screen* screen, modar_status* status);
+/* The visitor's turn and zoom at a time, for modar_orbit(). Returns 1, or 0 and changes nothing. */
+MODAR_EXPERIMENTAL int modar_screen_turntable(modar_screen* screen, double time_s,
+                                              modar_turntable* from);
+/* A pattern of the visitor's own, with the number that modar_tracker_add_pattern() gives it, shows
+ * the model of a scene, at its place. Returns 1, or 0 for an invalid index. */
+MODAR_EXPERIMENTAL int modar_screen_add_pattern(modar_screen* screen, uint32_t scene);
+MODAR_EXPERIMENTAL void modar_screen_forget_patterns(modar_screen* screen);
 
 enum {
   MODAR_SEEN = 0,  /* the pattern `subject` is on the screen: tell it in every step */
@@ -568,25 +649,25 @@ typedef struct modar_command {
 /* One step, at least once a frame. time_s: seconds, which do not fall. The pattern counts as lost
  * when it was not seen for more than a second. Returns how many commands there are for the app.
  * Allocates nothing as long as there are no more events than patterns and nodes. */
-MODAR_EXPERIMENTAL size_t modar_actions_step(modar_actions* actions, double time_s,
-                                             const modar_event* events, size_t count);
+MODAR_EXPERIMENTAL size_t modar_screen_step(modar_screen* screen, double time_s,
+                                            const modar_event* events, size_t count);
 /* Of the last step: returns 1 and the command, or 0 for an invalid index. */
-MODAR_EXPERIMENTAL int modar_actions_command(const modar_actions* actions, size_t index,
-                                             modar_command* command);
+MODAR_EXPERIMENTAL int modar_screen_command(const modar_screen* screen, size_t index,
+                                            modar_command* command);
 /* Copies and returns as modar_pattern_name(): begins with https://. */
 MODAR_EXPERIMENTAL size_t modar_action_address(const modar_bundle* bundle, uint32_t action,
                                                char* text, size_t size);
-MODAR_EXPERIMENTAL int modar_actions_shown(const modar_actions* actions, uint32_t node);
+MODAR_EXPERIMENTAL int modar_screen_shown(const modar_screen* screen, uint32_t node);
 /* 1: step and draw on, even if no frame comes: something turns, or a delay runs. */
-MODAR_EXPERIMENTAL int modar_actions_waiting(const modar_actions* actions);
+MODAR_EXPERIMENTAL int modar_screen_waiting(const modar_screen* screen);
 
 /* What of a pattern is to be drawn: the models of its scenes and its pictures, without hidden
- * ones, turned as actions say. view: modar_view() of its pose. items: `capacity` of them, the
- * first with its size set; as many as the bundle has scenes and nodes are enough. Returns how many
- * it filled. */
-MODAR_EXPERIMENTAL size_t modar_actions_items(modar_actions* actions, uint32_t pattern,
-                                              const float view[16], modar_item* items,
-                                              size_t capacity);
+ * ones, turned as actions and the visitor say. view: modar_view() of its pose. items: `capacity` of
+ * them, the first with its size set; as many as the bundle has scenes and nodes are enough. Returns
+ * how many it filled. */
+MODAR_EXPERIMENTAL size_t modar_screen_items(modar_screen* screen, uint32_t pattern,
+                                             const float view[16], modar_item* items,
+                                             size_t capacity);
 
 /* Where a label is drawn: with a mark of constant size, faded where it is covered. */
 typedef struct modar_label {
@@ -598,7 +679,7 @@ typedef struct modar_label {
 /* Returns 1 and the label, or 0 if it is hidden, behind the camera, or no label. view: modar_view()
  * of its pattern's pose. drawing: the last drawing; without items, nothing covers the label, which
  * saves the time of modar_pick(). */
-MODAR_EXPERIMENTAL int modar_label_project(const modar_actions* actions, uint32_t node,
+MODAR_EXPERIMENTAL int modar_label_project(const modar_screen* screen, uint32_t node,
                                            const modar_drawing* drawing, const float view[16],
                                            modar_label* label);
 

@@ -168,9 +168,10 @@ struct RenderOptions {
 bool is_picture(const BundleView& bundle, std::uint32_t node);
 
 /// Appends what of a pattern's scenes and nodes is shown: models, then pictures, each turned as its
-/// actions say. view: pattern space to eye space. Allocates nothing once `items` has its room.
+/// actions say, as an eye at the origin of the pattern's space sees it. Allocates nothing once
+/// `items` has its room.
 void add_items(const BundleView& bundle, const ActionMachine& machine, std::uint32_t pattern,
-               const glm::mat4& view, std::vector<DrawItem>& items);
+               std::vector<DrawItem>& items);
 
 /// Pattern-plane matrix of a scene: its offset, rotation and scale on the default placement (the
 /// model's largest side equals the pattern's largest side).

@@ -556,6 +556,7 @@ public final class AppRun {
         view.touch(new MotionEvent(MotionEvent.ACTION_POINTER_DOWN, 100, 100, 200, 100));
         view.touch(new MotionEvent(MotionEvent.ACTION_MOVE, 100, 100, 200, 100));
         view.touch(new MotionEvent(MotionEvent.ACTION_MOVE, 50, 100, 250, 100));
+        view.touch(new MotionEvent(MotionEvent.ACTION_POINTER_UP, 50, 100, 250, 100));
         view.touch(new MotionEvent(MotionEvent.ACTION_UP, 50, 100));
         view.requestRender();
         view.frame();

@@ -84,7 +84,7 @@ public final class BridgeRun {
                 if (commands[k] == Native.LINK)
                     check(Native.address(session, commands[k + 2]).startsWith("https://"), "an address");
             }
-            if (commands != null) media.execute(commands, false);
+            if (commands != null) media.execute(commands);
             media.upload();
             Native.onDrawFrame(session, frames[i], poses.bytes);
             GlContext.read(rgba);
@@ -110,7 +110,8 @@ public final class BridgeRun {
         }
         check(android.media.MediaPlayer.all.get(0).bytes > 1000 && android.media.MediaPlayer.all.get(0).volume == 0,
                 "a silent film");
-        media.setSound(true);
+        Native.press(session, Native.PRESS_SOUND);
+        media.follow();
         check(android.media.MediaPlayer.all.get(0).volume == 1, "sound");
         check(media.transcript(0, "en").equals("One & only"), "a transcript");
         media.close();
@@ -340,7 +341,10 @@ public final class BridgeRun {
             GlContext.read(pictures[i]);
         }
         if (layout == PLANES) {
-            Native.setGesture(session, 1, 0, 0.5f, 0);
+            check(Native.touch(session, 0, 5, width / 2, height / 2) == 0
+                            && Native.touch(session, 1, 5, width, height / 2) == Native.MOVED
+                            && Native.touch(session, 2, 5, width, height / 2) == 0,
+                    "half around");
             Native.onDrawFrame(session, frames[frames.length - 1], poses.bytes);
             ByteBuffer moved = ByteBuffer.allocateDirect(4 * width * height);
             GlContext.read(moved);
@@ -420,7 +424,7 @@ public final class BridgeRun {
         throwsCode("android.surface", () -> Native.onDrawFrame(session, frames[0], poses.bytes));
         throwsCode("android.surface", () -> Native.pick(session, 1, 1));
         check(Native.focal(session) == 0, "no frames, no focal length");
-        throwsCode("android.surface", () -> Native.onDrawOrbit(session, 0, 0, 0, 1));
+        throwsCode("android.surface", () -> Native.onDrawOrbit(session, 0, 0));
         throwsCode("android.index", () -> Native.patternName(session, 99));
         throwsCode("android.index", () -> Native.modelName(session, -1));
         GlContext.create(width, height);
@@ -451,7 +455,11 @@ public final class BridgeRun {
             throwsCode("android.closed", () -> Native.onSurfaceCreated(closed, null));
             throwsCode("android.closed", () -> Native.onSurfaceChanged(closed, 1, 1, 0, false));
             throwsCode("android.closed", () -> Native.setCamera(closed, 4, 4, null, 0, false, false));
-            throwsCode("android.closed", () -> Native.setGesture(closed, 1, 0, 0, 0));
+            throwsCode("android.closed", () -> Native.touch(closed, 0, 0, 0, 0));
+            throwsCode("android.closed", () -> Native.lookAround(closed, 0, 0, true));
+            throwsCode("android.closed", () -> Native.waiting(closed));
+            throwsCode("android.closed", () -> Native.press(closed, 0));
+            throwsCode("android.closed", () -> Native.status(closed));
             throwsCode("android.closed", () -> Native.patternCount(closed));
             throwsCode("android.closed", () -> Native.patternName(closed, 0));
             throwsCode("android.closed", () -> Native.reason(closed));
@@ -459,7 +467,7 @@ public final class BridgeRun {
             throwsCode("android.closed", () -> Native.reset(closed));
             throwsCode("android.closed", () -> Native.onTurn(closed, 0, 0, 0, 0, true));
             throwsCode("android.closed", () -> Native.pick(closed, 0, 0));
-            throwsCode("android.closed", () -> Native.onDrawOrbit(closed, 0, 0, 0, 1));
+            throwsCode("android.closed", () -> Native.onDrawOrbit(closed, 0, 0));
             throwsCode("android.closed", () -> Native.focal(closed));
             throwsCode("android.closed", () -> Native.trim(closed));
             throwsCode("android.closed", () -> Native.language(closed, 0));

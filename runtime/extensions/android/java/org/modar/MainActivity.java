@@ -17,6 +17,7 @@ import android.os.Bundle;
 import android.os.Handler;
 import android.os.Looper;
 import android.os.Message;
+import android.provider.Settings;
 import android.view.Display;
 import android.view.MotionEvent;
 import android.view.View;
@@ -54,6 +55,8 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     private static final int FIRST = 13;
     private static final int CHOSEN_PICTURE = 2;
 
+    /** Words of what modar.h calls MODAR_HINT_CLOSER and so on. */
+    private static final String[] HINTS = {"look", "far", "dark", "blurred", "outside", "hold"};
     private static final int[] MENU
             = {R.id.menu_go, R.id.menu_take, R.id.menu_choose, R.id.menu_forget, R.id.own_how, R.id.own_use};
     private static final String[] MENU_WORDS
@@ -61,7 +64,6 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
 
     private final Handler main = new Handler(Looper.getMainLooper(), this);
     private Diagnostics diagnostics;
-    private Gestures gestures = new Gestures();
     private Words words;
     private Bundles bundles;
     private Photos photos;
@@ -97,8 +99,8 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     private int toldOn;
     private String heard = "";
     private TextView caption;
-    /** A look without the camera; null: with it. */
-    private Orbit orbit;
+    /** The pattern of a look without the camera; -1: with it. */
+    private int around = -1;
     /** An error stays on the screen until something works again; null: advice. */
     private String trouble;
     private long noticeUntil;
@@ -141,6 +143,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         showIf(findViewById(R.id.update), Fetch.AVAILABLE);
         stage = new Stage(view, this, diagnostics);
         stage.focal = bundles.focal();
+        stage.still = Settings.Global.getFloat(getContentResolver(), Settings.Global.ANIMATOR_DURATION_SCALE, 1) == 0;
         view.setEGLContextClientVersion(2);
         view.setEGLConfigChooser(new Samples());
         view.setPreserveEGLContextOnPause(true);
@@ -222,8 +225,8 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         if (trimmed && source >= 0) hint.setImageBitmap(bundles.hint(sources.get(source)));
         trimmed = false;
         view.onResume();
-        if (orbit != null) {
-            stage.look(orbit);
+        if (around >= 0) {
+            stage.look(around);
         } else if (!mayUseCamera()) {
             if (!asked) askForCamera();
         } else {
@@ -315,7 +318,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     }
 
     private void startCamera() {
-        if (feed != null || session == 0 || orbit != null) return;
+        if (feed != null || session == 0 || around >= 0) return;
         trouble = null;
         followDisplay();
         try {
@@ -363,7 +366,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
             trouble = damage != null ? words.get("bundle", damage.getMessage()) : words.get("empty", bundles.folder);
         }
         closeCamera();
-        if (orbit != null) look(session == 0 ? null : new Orbit(0));
+        if (around >= 0) look(session == 0 ? -1 : 0);
         showMore();
         if (resumed && mayUseCamera()) startCamera();
         follow();
@@ -426,13 +429,9 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         told = null;
         showIf(findViewById(R.id.sound), media != null);
         showIf(findViewById(R.id.pause), media != null);
-        label(R.id.sound, "sound");
-        label(R.id.pause, "pause");
         main.removeMessages(CAPTION);
         if (media != null && resumed) main.sendEmptyMessage(CAPTION);
         stage.show(opened, bundles.lens(), media, marks);
-        gestures = new Gestures();
-        move();
         from.session = opened;
         showMenu(null);
         if (!bundles.isVerified(from)) new Job("modar-verify", from).start();
@@ -544,6 +543,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     /** The line at the bottom: trouble, a notice, the detected pattern, or advice. */
     private void follow() {
         if (resumed) followDisplay();
+        if (media != null) showSwitches();
         if (info.getVisibility() == View.VISIBLE) {
             ((TextView) findViewById(R.id.info_text)).setText(diagnostics.text(words));
         }
@@ -551,13 +551,23 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         boolean looking = false;
         String text = trouble == null && taking ? words.get("own-how") : trouble;
         if (text == null) {
-            int seen = stage.seen();
+            int seen = status()[Native.SHOWN];
             looking = seen < 0;
             text = looking ? advice() : shownOn(seen);
             describe(seen);
         }
         say(text);
         showIf(hint, looking);
+    }
+
+    /** See Native.status(). */
+    private int[] status() {
+        try {
+            if (session != 0) return Native.status(session);
+        } catch (ModarException gone) {
+            diagnostics.error(gone.getMessage());
+        }
+        return new int[] {0, 0, -1, 0, 0, 0};
     }
 
     /** A label's words, or the pattern's; and what would be heard there, while nothing is. */
@@ -662,12 +672,8 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
             names.append(texts.name(pattern));
         }
         String look = words.get("look", names);
-        if (diagnostics.frames() == 0) return look;
-        try {
-            return look + "\n" + words.advice(Native.reason(session));
-        } catch (ModarException notYet) {
-            return look;
-        }
+        int hint = status()[Native.HINT];
+        return hint == 0 ? look : look + "\n" + words.get(HINTS[hint]);
     }
 
     private void notice(String text) {
@@ -700,21 +706,20 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     /** From the camera's picture to the models alone, and back. */
     private void lookAround() {
         if (session == 0 || baked == 0) return;
-        look(orbit == null ? new Orbit(Math.max(0, stage.seen()) % baked) : null);
+        look(around < 0 ? Math.max(0, status()[Native.SHOWN]) % baked : -1);
     }
 
-    private void look(Orbit around) {
-        orbit = around;
-        gestures = new Gestures();
-        if (around != null) {
+    private void look(int pattern) {
+        around = pattern;
+        if (around >= 0) {
             trouble = null;
             stopCamera();
             closeCamera();
         }
         stage.look(around);
-        label(R.id.around, around == null ? "around" : "camera-again");
+        label(R.id.around, around < 0 ? "around" : "camera-again");
         showMore();
-        if (around == null && resumed) {
+        if (around < 0 && resumed) {
             if (mayUseCamera()) startCamera();
             else askForCamera();
         }
@@ -722,7 +727,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     }
 
     private void showMore() {
-        showIf(findViewById(R.id.models), sources.size() > 1 || (orbit != null && baked > 1));
+        showIf(findViewById(R.id.models), sources.size() > 1 || (around >= 0 && baked > 1));
     }
 
     // --- The menu, and the visitor's own pictures ---
@@ -744,7 +749,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         taking = on;
         stage.setBare(on);
         label(R.id.picture, on ? "own-take" : "picture");
-        if (on && orbit != null) look(null);
+        if (on && around >= 0) look(-1);
         follow();
     }
 
@@ -832,28 +837,32 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
 
     @Override
     public boolean onTouchEvent(MotionEvent event) {
-        int done = gestures.touch(event, view.getWidth(), view.getHeight());
-        if (done == Gestures.MOVED) move();
-        if (done == Gestures.TAPPED) tapped(event.getX(), event.getY());
+        int action = event.getActionMasked();
+        boolean down = action == MotionEvent.ACTION_DOWN || action == MotionEvent.ACTION_POINTER_DOWN;
+        boolean up = action == MotionEvent.ACTION_UP || action == MotionEvent.ACTION_POINTER_UP;
+        if (down || up) {
+            touch(event, event.getActionIndex(), down ? 0 : 2);
+        } else if (action == MotionEvent.ACTION_MOVE || action == MotionEvent.ACTION_CANCEL) {
+            for (int i = 0; i < event.getPointerCount(); i++)
+                touch(event, i, action == MotionEvent.ACTION_MOVE ? 1 : 3);
+        }
         return true;
     }
 
-    private void move() {
-        if (session == 0) return;
-        if (orbit != null) {
-            orbit.follow(gestures);
-            view.requestRender();
-            return;
-        }
+    private void touch(MotionEvent event, int index, int kind) {
+        float x = event.getX(index);
+        float y = event.getY(index);
         try {
-            Native.setGesture(session, gestures.scale, gestures.turn, 0, gestures.shift);
+            int done = session == 0 ? 0 : Native.touch(session, kind, event.getPointerId(index), x, y);
+            if (done == Native.MOVED && around >= 0) view.requestRender();
+            if (done == Native.TAPPED || (session == 0 && kind == 2)) tapped(x, y);
         } catch (ModarException error) {
             failed(error);
         }
     }
 
     private void tapped(float x, float y) {
-        if (orbit == null && !mayUseCamera()) {
+        if (around < 0 && !mayUseCamera()) {
             askForCamera();
             return;
         }
@@ -921,19 +930,17 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
                 lookAround();
                 break;
             case R.id.models:
-                if (orbit != null && orbit.pattern + 1 < baked) {
-                    look(new Orbit(orbit.pattern + 1));
+                if (around >= 0 && around + 1 < baked) {
+                    look(around + 1);
                 } else {
                     showNext();
                 }
                 break;
             case R.id.sound:
-                media.setSound(!media.sound());
-                label(R.id.sound, media.sound() ? "silence" : "sound");
+                press(Native.PRESS_SOUND);
                 break;
             case R.id.pause:
-                media.hold(!media.held());
-                label(R.id.pause, media.held() ? "play" : "pause");
+                press(Native.PRESS_PAUSE);
                 break;
             case R.id.update:
                 startUpdate();
@@ -943,6 +950,23 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
                 follow();
                 writeDiagnostics();
         }
+    }
+
+    private void press(int button) {
+        try {
+            Native.press(session, button);
+            media.follow();
+            showSwitches();
+        } catch (ModarException gone) {
+            diagnostics.error(gone.getMessage());
+        }
+    }
+
+    /** What a touch of the buttons does next. */
+    private void showSwitches() {
+        int[] now = status();
+        label(R.id.sound, now[Native.HEARD] != 0 ? "silence" : "sound");
+        label(R.id.pause, now[Native.PAUSED] != 0 ? "play" : "pause");
     }
 
     // --- Files ---

@@ -48,9 +48,10 @@ final class Media implements MediaPlayer.OnPreparedListener, MediaPlayer.OnCompl
     private final List<Player> players = new ArrayList<>();
     private final VideoCopy copy = new VideoCopy(GLES11Ext.GL_TEXTURE_EXTERNAL_OES);
     private final float[] map = new float[16];
+    /** The app is in the background. */
     private boolean held;
+    private boolean paused;
     private boolean sound;
-    private boolean asked;
 
     /** folder: for files that are removed at once. redraw: there is something new to draw. */
     Media(long session, File folder, Runnable redraw) throws ModarException {
@@ -68,13 +69,13 @@ final class Media implements MediaPlayer.OnPreparedListener, MediaPlayer.OnCompl
         return players.isEmpty();
     }
 
-    /** On GL's thread: what of the commands of Native.act() concerns media. tapped: the visitor asked for it, and hears it. */
-    synchronized void execute(int[] commands, boolean tapped) throws ModarException {
+    /** On GL's thread: what of the commands of Native.act() concerns media. */
+    synchronized void execute(int[] commands) throws ModarException {
+        follow();
         for (int i = 0; i < commands.length; i += 3) {
             Player player = of(commands[i + 1]);
             if (player == null || (commands[i] != Native.PLAY && commands[i] != Native.PAUSE)) continue;
             player.wanted = commands[i] == Native.PLAY;
-            if (player.wanted && tapped && !asked) setSound(true);
             if (player.wanted && player.decoder == null) open(player);
             follow(player);
         }
@@ -194,7 +195,7 @@ final class Media implements MediaPlayer.OnPreparedListener, MediaPlayer.OnCompl
 
     private void follow(Player player) {
         if (!player.prepared) return;
-        boolean plays = player.wanted && !held;
+        boolean plays = player.wanted && !held && !paused;
         if (plays == player.decoder.isPlaying()) return;
         if (plays) player.decoder.start();
         else player.decoder.pause();
@@ -249,24 +250,21 @@ final class Media implements MediaPlayer.OnPreparedListener, MediaPlayer.OnCompl
         players.clear();
     }
 
-    /** The visitor's own pause, or the app's. */
+    /** The app goes to the background, or is back. */
     synchronized void hold(boolean on) {
         held = on;
         for (Player each : players) follow(each);
     }
 
-    synchronized boolean held() {
-        return held;
-    }
-
-    synchronized void setSound(boolean on) {
-        asked = true;
-        sound = on;
-        for (Player each : players) loudness(each);
-    }
-
-    synchronized boolean sound() {
-        return sound;
+    /** What the visitor wants of sound now. */
+    synchronized void follow() throws ModarException {
+        int[] status = Native.status(session);
+        sound = status[Native.HEARD] != 0;
+        paused = status[Native.PAUSED] != 0;
+        for (Player each : players) {
+            loudness(each);
+            follow(each);
+        }
     }
 
     private void loudness(Player player) {

@@ -128,8 +128,37 @@ public final class Native {
     public static native void onSurfaceChanged(long session, int width, int height, int rotation, boolean mirror)
             throws ModarException;
 
-    /** The visitor's gesture: a scale factor, radians about the pattern's normal, and a shift along it in half longest sides. */
-    public static native void setGesture(long session, float scale, float turn, float x, float y) throws ModarException;
+    public static final int MOVED = 1;
+    public static final int TAPPED = 2;
+
+    /**
+     * A finger on the surface: see modar_screen_touch().
+     *
+     * @param kind 0 down, 1 moved, 2 up, 3 cancelled
+     * @return 0, MOVED or TAPPED
+     */
+    public static native int touch(long session, int kind, int finger, float x, float y) throws ModarException;
+
+    // Buttons, and words of status().
+    public static final int PRESS_SOUND = 4;
+    public static final int PRESS_PAUSE = 5;
+    public static final int HINT = 1;
+    public static final int SHOWN = 2;
+    public static final int HEARD = 3;
+    public static final int PAUSED = 4;
+
+    /** A button: see modar_screen_press(). */
+    public static native void press(long session, int button) throws ModarException;
+
+    /** See modar_status: six words; SHOWN is an index or -1. */
+    public static native int[] status(long session) throws ModarException;
+
+    /** A look without a camera from now on, until resetActions(). present: it goes once around at first. */
+    public static native void lookAround(long session, int pattern, double timeS, boolean present)
+            throws ModarException;
+
+    /** Something turns by itself: draw on. */
+    public static native boolean waiting(long session) throws ModarException;
 
     /** Draws the frame and the content of its patterns. */
     public static native void onDrawFrame(long session, byte[] nv21, ByteBuffer poses) throws ModarException;
@@ -141,13 +170,8 @@ public final class Native {
     /**
      * Draws the content of a pattern without a camera, for an eye that goes around it: see
      * modar_orbit(). The surface is cleared before.
-     *
-     * @param turn radians about the pattern's normal
-     * @param tilt radians above its plane
-     * @param zoom 1: all of it is seen
      */
-    public static native void onDrawOrbit(long session, int pattern, double turn, double tilt, double zoom)
-            throws ModarException;
+    public static native void onDrawOrbit(long session, int pattern, double timeS) throws ModarException;
 
     /** The model drawn last under a touch (pixels from the surface's top left), or -1; by onDrawOrbit() as well. */
     public static native int pick(long session, float x, float y) throws ModarException;
@@ -181,7 +205,7 @@ public final class Native {
     /** A video or sound that does not loop came to its end. */
     public static native void ended(long session, int node) throws ModarException;
 
-    /** Nodes as at the start: before another clock. */
+    /** Nodes and gestures as at the start: before another clock. */
     public static native void resetActions(long session) throws ModarException;
 
     /** The nodes of a pattern, by index from 0: six words; null: no more. */

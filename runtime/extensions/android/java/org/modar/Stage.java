@@ -23,9 +23,10 @@ final class Stage implements GLSurfaceView.Renderer {
     private volatile String cameraFile;
     /** What Native.focal() said of this phone's camera before; 0: unknown. */
     volatile double focal;
-    /** A look without the camera; null: with it. */
-    private volatile Orbit orbit;
-    private volatile boolean tapped;
+    /** The pattern of a look without the camera; -1: with it. */
+    private volatile int around = -1;
+    /** Without animations: the look does not begin by a turn. */
+    volatile boolean still;
     /** A camera has another clock: what acts begins anew. */
     private volatile boolean wantsReset;
     private volatile Media media;
@@ -36,7 +37,6 @@ final class Stage implements GLSurfaceView.Renderer {
     private volatile boolean bare;
     private volatile int displayDegrees;
     private volatile int sensorDegrees;
-    private volatile int seen = -1;
 
     // GL's thread alone:
     private Frame shown;
@@ -63,7 +63,7 @@ final class Stage implements GLSurfaceView.Renderer {
         marks = points;
         cameraFile = lens;
         session = opened;
-        seen = -1;
+        wantsReset = true;
         dropFrames();
         view.queueEvent(new Runnable() {
             @Override
@@ -79,23 +79,15 @@ final class Stage implements GLSurfaceView.Renderer {
         displayDegrees = degrees;
     }
 
-    /** The first pattern with content among the shown ones, or -1. */
-    int seen() {
-        Orbit now = orbit;
-        return now != null ? now.pattern : seen;
-    }
-
     /** Hits of pick() go to the actions of the next frame. */
     void tapped() {
-        tapped = true;
         view.requestRender();
     }
 
-    /** With the camera stopped. around: what to look at, or null for the camera's picture again. */
-    void look(Orbit around) {
-        if (around != orbit) wantsReset = true;
-        orbit = around;
-        seen = -1;
+    /** With the camera stopped. pattern: what to look at, or -1 for the camera's picture again. */
+    void look(int pattern) {
+        if (pattern != around) wantsReset = true;
+        around = pattern;
         view.requestRender();
     }
 
@@ -158,7 +150,6 @@ final class Stage implements GLSurfaceView.Renderer {
         try {
             int visible = frame.track(session);
             diagnostics.tracked(System.nanoTime() - start, visible > 0);
-            seen = firstShown(frame.poses);
         } catch (ModarException error) {
             frame.release();
             screen.failed(error);
@@ -167,13 +158,6 @@ final class Stage implements GLSurfaceView.Renderer {
         Frame late = next.getAndSet(frame);
         if (late != null) late.release();
         view.requestRender();
-    }
-
-    private static int firstShown(Poses poses) {
-        for (int i = 0; i < poses.patterns; i++) {
-            if (poses.shown(i)) return i;
-        }
-        return -1;
     }
 
     void cameraFailed(String cause) {
@@ -210,18 +194,20 @@ final class Stage implements GLSurfaceView.Renderer {
         long start = System.nanoTime();
         try {
             prepare();
-            Orbit around = session == 0 ? null : orbit;
-            float ground = around != null ? GROUND : 0;
-            if (around != null || shown == null) {
+            int pattern = session == 0 ? -1 : around;
+            float ground = pattern >= 0 ? GROUND : 0;
+            if (pattern >= 0 || shown == null) {
                 GLES20.glClearColor(ground, ground, ground, 1);
                 GLES20.glClear(GLES20.GL_COLOR_BUFFER_BIT | GLES20.GL_DEPTH_BUFFER_BIT);
             }
-            if (around != null) {
-                if (lookedAt == null || lookedAt.patterns <= around.pattern)
+            if (pattern >= 0) {
+                double now = System.nanoTime() * 1e-9;
+                if (lookedAt == null || lookedAt.patterns <= pattern)
                     lookedAt = new Poses(Native.patternCount(session));
-                lookedAt.show(around.pattern);
-                act(System.nanoTime() * 1e-9, lookedAt);
-                Native.onDrawOrbit(session, around.pattern, around.turn, around.tilt, around.zoom);
+                lookedAt.show(pattern);
+                act(now, lookedAt);
+                Native.onDrawOrbit(session, pattern, now);
+                if (Native.waiting(session)) view.requestRender();
             } else if (shown != null) {
                 if (bare) shown.poses.clear();
                 act(shown.timeS, shown.poses);
@@ -284,14 +270,13 @@ final class Stage implements GLSurfaceView.Renderer {
     /** What the bundle's actions ask for, and the newest pictures of its videos. */
     private void act(double timeS, Poses poses) throws ModarException {
         Media plays = media;
-        if (wantsReset) Native.resetActions(session);
+        if (wantsReset && around >= 0) Native.lookAround(session, around, timeS, !still);
+        else if (wantsReset) Native.resetActions(session);
         wantsReset = false;
         if (plays != null) plays.tellEnded();
-        boolean asked = tapped;
-        tapped = false;
         int[] commands = Native.act(session, timeS, poses.bytes);
         if (commands != null) {
-            if (plays != null) plays.execute(commands, asked);
+            if (plays != null) plays.execute(commands);
             for (int i = 0; i < commands.length; i += 3) {
                 if (commands[i] == Native.TEXT) screen.tell(commands[i + 1]);
                 if (commands[i] == Native.LINK) screen.ask(Native.address(session, commands[i + 2]));

@@ -26,11 +26,6 @@ final class Words {
         return String.format(Locale.ROOT, words.getProperty(key, key), values);
     }
 
-    /** Advice for the tracker's reason; the same for all that have none of their own. */
-    String advice(String reason) {
-        return words.getProperty(reason, get("nothing"));
-    }
-
     /** Of languages (BCP 47 tags) the one to show: that of the locale, that with other regions, English, the first; null: none. */
     static String best(List<String> languages, Locale locale) {
         String wanted = locale.getLanguage() + "-" + locale.getCountry();

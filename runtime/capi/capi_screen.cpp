@@ -1,10 +1,10 @@
-// modar.h: nodes and actions. Nothing of the tracker, and of the renderer what makes no GL call.
+// modar.h: nodes and the screen. Nothing of the tracker, and of the renderer what makes no GL call.
 #include <memory>
 #include <vector>
 
 #include "formats/captions.hpp"
 #include "formats/meta_text.hpp"
-#include "modar/renderer.hpp"
+#include "modar/screen_machine.hpp"
 #include "runtime/capi/handles.hpp"
 
 static_assert(MODAR_NODE_MODEL == static_cast<int>(modar::NodeKind::kModel));
@@ -17,9 +17,11 @@ static_assert(MODAR_PAUSE == static_cast<int>(modar::ActionCommand::kPause));
 static_assert(MODAR_SHOW_TEXT == static_cast<int>(modar::ActionCommand::kText));
 static_assert(MODAR_OPEN_LINK == static_cast<int>(modar::ActionCommand::kLink));
 
-struct modar_actions {
+struct modar_screen {
+  explicit modar_screen(const modar::BundleView& bundle) : view(bundle), machine(bundle) {}
+
   modar::BundleView view;
-  modar::ActionMachine machine;
+  modar::ScreenMachine machine;
   std::vector<modar::SceneEvent> events;
   std::span<const modar::SceneCommand> commands;
   std::vector<modar::DrawItem> items;
@@ -27,8 +29,13 @@ struct modar_actions {
 
 namespace {
 
-bool has_node(const modar_actions* actions, uint32_t node) {
-  return actions != nullptr && node < actions->view.nodes().size();
+// modar_orbit(): the field of view across the smaller side, in radians, as from a hand's distance;
+// and room around the content.
+constexpr double kOrbitField = 0.6981317007977318;
+constexpr double kOrbitMargin = 1.06;
+
+bool has_node(const modar_screen* screen, uint32_t node) {
+  return screen != nullptr && node < screen->view.nodes().size();
 }
 
 std::optional<modar::MetaText::Kind> kind_of(int kind) {
@@ -142,29 +149,116 @@ size_t modar_action_address(const modar_bundle* bundle, uint32_t action, char* t
   return modar::copy_name(bundle->view.name(bundle->view.actions()[action].address), text, size);
 }
 
-modar_actions* modar_actions_create(const modar_bundle* bundle, modar_error* error) {
+modar_screen* modar_screen_create(const modar_bundle* bundle, modar_error* error) {
   if (bundle == nullptr) return modar::fail_null(modar::missing("bundle"), error);
-  auto made = std::make_unique<modar_actions>(
-      modar_actions{bundle->view, modar::ActionMachine(bundle->view), {}, {}, {}});
+  auto made = std::make_unique<modar_screen>(bundle->view);
   made->events.reserve(bundle->view.patterns().size() + 2 * bundle->view.nodes().size());
   made->items.reserve(bundle->view.scenes().size() + bundle->view.nodes().size());
   return made.release();
 }
 
-void modar_actions_destroy(modar_actions* actions) {
-  delete actions;
+void modar_screen_destroy(modar_screen* screen) {
+  delete screen;
 }
 
-void modar_actions_reset(modar_actions* actions) {
-  if (actions == nullptr) return;
-  actions->machine.reset();
-  actions->commands = {};
+void modar_screen_reset(modar_screen* screen) {
+  if (screen == nullptr) return;
+  screen->machine.reset();
+  screen->commands = {};
 }
 
-size_t modar_actions_step(modar_actions* actions, double time_s, const modar_event* events,
-                          size_t count) {
-  if (actions == nullptr || !modar::usable(time_s)) return 0;
-  actions->events.clear();
+int modar_orbit(const modar_bundle* bundle, uint32_t pattern, const modar_turntable* from,
+                modar_camera* camera, modar_pose* pose) {
+  if (pattern >= modar_pattern_count(bundle)) return 0;
+  if (from == nullptr || camera == nullptr || pose == nullptr) return 0;
+  const auto [size, turn, tilt, zoom] = modar::grown(*from);
+  modar_camera lens = modar::grown(*camera);
+  if (lens.width < 1 || lens.height < 1 || !(zoom > 0.0)) return 0;
+  if (!modar::usable(turn) || !modar::usable(tilt) || !modar::usable(zoom) ||
+      !modar::usable(1.0 / zoom))
+    return 0;
+  const modar::PatternRecord& plane = bundle->view.patterns()[pattern];
+  const glm::vec3 half(plane.half_width, plane.half_height, 0.0f);
+  glm::vec3 low = -half;
+  glm::vec3 high = half;
+  if (modar_pattern_bounds(bundle, pattern, &low.x, &high.x) != 0) {
+    low = glm::min(low, -half);
+    high = glm::max(high, half);
+  }
+  lens.fx = lens.fy = 0.5 * std::min(lens.width, lens.height) / std::tan(0.5 * kOrbitField);
+  lens.cx = 0.5 * (lens.width - 1);
+  lens.cy = 0.5 * (lens.height - 1);
+  std::fill(std::begin(lens.distortion), std::end(lens.distortion), 0.0);
+  // Who turns the content turns the eye the other way.
+  const auto angle = static_cast<float>(-turn);
+  const auto rise = static_cast<float>(tilt);
+  const glm::vec3 right(std::cos(angle), std::sin(angle), 0.0f);
+  const glm::vec3 back(right.y * std::cos(rise), -right.x * std::cos(rise), std::sin(rise));
+  const glm::vec3 axes[3] = {right, glm::cross(right, back), -back};
+  const double radius = 0.5 * static_cast<double>(glm::length(high - low));
+  const double distance = kOrbitMargin * radius / std::sin(0.5 * kOrbitField) / zoom;
+  const glm::vec3 eye = 0.5f * (high + low) + static_cast<float>(distance) * back;
+  modar_pose ours{};
+  ours.visible = ours.shown = 1;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      ours.rotation[3 * row + column] = axes[row][column];
+    }
+    ours.translation[row] = -glm::dot(axes[row], eye);
+  }
+  modar::give(lens, camera);
+  modar::give(ours, pose);
+  return 1;
+}
+
+int modar_screen_touch(modar_screen* screen, const modar_touch* touch) {
+  if (screen == nullptr || touch == nullptr) return MODAR_NOTHING;
+  const modar_touch asked = modar::grown(*touch);
+  const double numbers[] = {asked.x, asked.y, asked.width, asked.height};
+  if (!modar::usable(numbers, 4) || !(asked.width >= 1 && asked.height >= 1)) return MODAR_NOTHING;
+  return screen->machine.touch(asked);
+}
+
+void modar_screen_press(modar_screen* screen, int button, double steps) {
+  if (screen == nullptr || !modar::usable(steps)) return;
+  screen->machine.press(button, steps);
+}
+
+void modar_screen_look_around(modar_screen* screen, uint32_t pattern, double time_s, int present) {
+  if (screen == nullptr || !modar::usable(time_s)) return;
+  screen->machine.look_around(pattern, time_s, present != 0);
+}
+
+void modar_screen_follow(modar_screen* screen, double time_s, uint32_t number, int reason,
+                         double brightness) {
+  if (screen == nullptr || !modar::usable(time_s) || !modar::usable(brightness)) return;
+  screen->machine.follow(time_s, number, reason, brightness);
+}
+
+void modar_screen_status(const modar_screen* screen, modar_status* status) {
+  if (screen != nullptr) modar::give(screen->machine.status(), status);
+}
+
+int modar_screen_turntable(modar_screen* screen, double time_s, modar_turntable* from) {
+  if (screen == nullptr || from == nullptr || !modar::usable(time_s)) return 0;
+  modar::give(screen->machine.turntable(time_s), from);
+  return 1;
+}
+
+int modar_screen_add_pattern(modar_screen* screen, uint32_t scene) {
+  if (screen == nullptr || scene >= screen->view.scenes().size()) return 0;
+  screen->machine.add_pattern(scene);
+  return 1;
+}
+
+void modar_screen_forget_patterns(modar_screen* screen) {
+  if (screen != nullptr) screen->machine.forget_patterns();
+}
+
+size_t modar_screen_step(modar_screen* screen, double time_s, const modar_event* events,
+                         size_t count) {
+  if (screen == nullptr || !modar::usable(time_s)) return 0;
+  screen->events.clear();
   count = modar::item_count(events, count);
   for (size_t i = 0; i < count; ++i) {
     const modar_event event = modar::item_at(events, i);
@@ -172,37 +266,37 @@ size_t modar_actions_step(modar_actions* actions, double time_s, const modar_eve
     const Kind kind = event.kind == MODAR_TAP     ? Kind::kTap
                       : event.kind == MODAR_ENDED ? Kind::kEnded
                                                   : Kind::kSeen;
-    actions->events.push_back({kind, event.subject, event.material - 1});
+    screen->events.push_back({kind, event.subject, event.material - 1});
   }
-  actions->commands = actions->machine.step(time_s, actions->events);
-  return actions->commands.size();
+  screen->commands = screen->machine.step(time_s, screen->events);
+  return screen->commands.size();
 }
 
-int modar_actions_command(const modar_actions* actions, size_t index, modar_command* command) {
-  if (actions == nullptr || index >= actions->commands.size()) return 0;
-  const modar::SceneCommand& ours = actions->commands[index];
+int modar_screen_command(const modar_screen* screen, size_t index, modar_command* command) {
+  if (screen == nullptr || index >= screen->commands.size()) return 0;
+  const modar::SceneCommand& ours = screen->commands[index];
   modar::give({0, static_cast<int>(ours.command), ours.node, ours.action, 0}, command);
   return 1;
 }
 
-int modar_actions_shown(const modar_actions* actions, uint32_t node) {
-  return has_node(actions, node) && actions->machine.shown(node) ? 1 : 0;
+int modar_screen_shown(const modar_screen* screen, uint32_t node) {
+  return has_node(screen, node) && screen->machine.shown(node) ? 1 : 0;
 }
 
-int modar_actions_waiting(const modar_actions* actions) {
-  return actions != nullptr && actions->machine.waiting() ? 1 : 0;
+int modar_screen_waiting(const modar_screen* screen) {
+  return screen != nullptr && screen->machine.waiting() ? 1 : 0;
 }
 
-size_t modar_actions_items(modar_actions* actions, uint32_t pattern, const float view[16],
-                           modar_item* items, size_t capacity) {
-  capacity = modar::item_count(items, capacity);
-  if (actions == nullptr || view == nullptr || capacity == 0 || !modar::usable(view, 16)) return 0;
-  actions->items.clear();
-  modar::add_items(actions->view, actions->machine, pattern, glm::make_mat4(view), actions->items);
-  const size_t count = std::min(capacity, actions->items.size());
+size_t modar_screen_items(modar_screen* screen, uint32_t pattern, const float view[16],
+                          modar_item* items, size_t capacity) {
+  if (screen == nullptr || view == nullptr || capacity == 0 || !modar::usable(view, 16)) return 0;
+  if (modar::item_count(items, capacity) == 0) return 0;
+  screen->items.clear();
+  screen->machine.add_items(pattern, glm::make_mat4(view), screen->items);
+  const size_t count = std::min(capacity, screen->items.size());
   const size_t stride = items->size;
   for (size_t i = 0; i < count; ++i) {
-    const modar::DrawItem& ours = actions->items[i];
+    const modar::DrawItem& ours = screen->items[i];
     modar_item item{};
     item.model = ours.model;
     modar::copy_matrix(ours.to_eye, item.to_eye);
@@ -216,23 +310,23 @@ size_t modar_actions_items(modar_actions* actions, uint32_t pattern, const float
   return count;
 }
 
-int modar_label_project(const modar_actions* actions, uint32_t node, const modar_drawing* drawing,
+int modar_label_project(const modar_screen* screen, uint32_t node, const modar_drawing* drawing,
                         const float view[16], modar_label* label) {
-  if (!has_node(actions, node) || drawing == nullptr || view == nullptr || label == nullptr) {
+  if (!has_node(screen, node) || drawing == nullptr || view == nullptr || label == nullptr) {
     return 0;
   }
   const modar_drawing drawn = modar::grown(*drawing);
   if (!modar::usable(drawn) || drawn.camera == nullptr || !modar::usable(view, 16)) return 0;
-  const modar::NodeRecord& record = actions->view.nodes()[node];
+  const modar::NodeRecord& record = screen->view.nodes()[node];
   if (record.kind != static_cast<uint32_t>(modar::NodeKind::kLabel) ||
-      !actions->machine.shown(node)) {
+      !screen->machine.shown(node)) {
     return 0;
   }
   const glm::vec4 point(record.place[0], record.place[1], record.place[2], 1.0f);
   const modar::Camera ours = modar::camera_of(*drawn.camera);
   modar_label found{};
   if (!project(ours, glm::vec3(glm::make_mat4(view) * point), found)) return 0;
-  const modar_bundle bundle{{}, {}, actions->view};
+  const modar_bundle bundle{{}, {}, screen->view};
   auto hit = modar::sized<modar_hit>();
   // Surfaces nearer than 98 % of the way cover the point: a label is on its own surface.
   constexpr float kNearer = 0.98f;
