@@ -262,7 +262,7 @@ def plant(room, count, seed, tests):
     for kind, (path, *fault) in chosen(room, seed):
         if tried == count:
             break
-        before, start = (ROOT / path).read_text(), time.monotonic()
+        before, start = (TREE / path).read_text(), time.monotonic()
         clean = tests.object_of(path)
         after = planted(before, fault)
         (TREE / path).write_text(after)
