@@ -192,7 +192,6 @@ void ExtendedTracking::find_again(const Pose& followed) {
     return;
   }
   next.tracked = true;
-  next.again = true;
   tracks_[anchor_] = next;
 }
 

@@ -33,7 +33,6 @@ struct Track {
   bool verified = false;                     ///< by the PrintVerifier
   bool measured = false;                     ///< by a free homography, while it is tracked
   int frames_to_measure = 0;                 ///< so again
-  bool again = false;                        ///< it was lost a moment before it was found
 };
 
 /// The present frame, and the steps that move tracks to it.

@@ -112,23 +112,32 @@ glm::dmat3 Mirror::pixels_of(const TrackedPattern& pattern) const {
 
 CellGrid::CellGrid(const TrackedPattern& pattern, const PlaneMap& map,
                    std::span<const GrayImage> pyramid, int side)
-    : pattern_(pattern), map_(map), pyramid_(pyramid), side_(side) {
-  // Of a print far away the frame shows less than the samples could.
-  const double step = step_of(pattern, side);
-  const double scale = scale_of(pattern, map);
-  spread_ = std::max(1.0, 1.0 / (step * std::max(scale, 1e-6)));
-  pixels_ = spread_ * step * scale;
+    : pattern_(pattern),
+      map_(map),
+      pyramid_(pyramid),
+      side_(side),
+      step_(step_of(pattern, side)),
+      scale_(std::max(scale_of(pattern, map), 1e-6)) {}
+
+double CellGrid::spread(int cell) const {
+  const bool fine = cell < kCells && (pattern_.fine_cells >> cell & 1) != 0;
+  return spread_from(fine ? kFootprint : 1.0);
 }
 
-bool CellGrid::see(int cell, CellSamples& seen, const Mirror* mirror) const {
-  const Filtered frame(pyramid_, pixels_);
+double CellGrid::spread_from(double least) const {
+  return std::max(least, 1.0 / (step_ * scale_));
+}
+
+bool CellGrid::see(int cell, CellSamples& seen, const Mirror* mirror, double spread) const {
+  const double pixels = (spread > 0.0 ? spread : this->spread(cell)) * step_ * scale_;
+  const Filtered frame(pyramid_, pixels);
   const GrayImage& whole = pyramid_[0];
   for (int k = 0; k < kCellSamples * kCellSamples; ++k) {
     const glm::dvec2 share = place_of(pattern_, cell, k, mirror, side_);
     bool in_front = false;
     const glm::dvec2 p =
         map_.at({share.x * pattern_.width() - 0.5, share.y * pattern_.height() - 0.5}, in_front);
-    const double margin = 0.5 * pixels_;
+    const double margin = 0.5 * pixels;
     if (!in_front || !(p.x >= margin && p.y >= margin && p.x < whole.width - 1 - margin &&
                        p.y < whole.height - 1 - margin)) {
       return false;
@@ -147,6 +156,18 @@ void CellGrid::expect(const TrackedPattern& print, int cell, CellSamples& expect
     expected[static_cast<std::size_t>(k)] =
         picture.at(share.x * print.width(), share.y * print.height());
   }
+}
+
+std::uint64_t fine_cells(const TrackedPattern& pattern) {
+  std::uint64_t fine = 0;
+  CellSamples whole{};
+  CellSamples sharp{};
+  for (int cell = 0; cell < kCells; ++cell) {
+    CellGrid::expect(pattern, cell, whole);
+    CellGrid::expect(pattern, cell, sharp, nullptr, kFootprint);
+    fine |= std::uint64_t{compare(whole, sharp).correlation < kAliased} << cell;
+  }
+  return fine;
 }
 
 CellMatch compare(const CellSamples& expected, const CellSamples& seen) {
@@ -176,7 +197,7 @@ PhotometricCheck check_photometry(const TrackedPattern& pattern, const PlaneMap&
   CellSamples seen{};
   for (int cell = 0; cell < cells_of(pattern); ++cell) {
     if (!grid.see(cell, seen)) continue;
-    CellGrid::expect(pattern, cell, expected, nullptr, grid.spread());
+    CellGrid::expect(pattern, cell, expected, nullptr, grid.spread(cell));
     const CellMatch match = compare(expected, seen);
     if (!match.textured()) continue;
     ++check.cells;
@@ -198,9 +219,9 @@ PrintDifference compare_prints(const TrackedPattern& first, const TrackedPattern
   CellSamples seen{};
   for (int cell = 0; cell < kCells; ++cell) {
     if (!grid.see(cell, seen)) continue;
-    CellGrid::expect(first, cell, expected, nullptr, grid.spread());
+    CellGrid::expect(first, cell, expected, nullptr, grid.spread(cell));
     const CellMatch one = compare(expected, seen);
-    CellGrid::expect(second, cell, expected, nullptr, grid.spread());
+    CellGrid::expect(second, cell, expected, nullptr, grid.spread(cell));
     const CellMatch other = compare(expected, seen);
     difference.first += one.agrees() && other.disagrees() ? 1 : 0;
     difference.second += other.agrees() && one.disagrees() ? 1 : 0;

@@ -36,6 +36,13 @@ inline constexpr float kChanged = 0.5f;
 /// cells.
 inline constexpr float kElsewhere = 0.9945f;
 
+/// Distances between samples that each averages, where the frame resolves it. Higher aliases fine
+/// regular print, lower needs truer poses. [0.25, 1]
+inline constexpr double kFootprint = 0.5;
+/// Correlation of a cell with itself at that, below which its samples alias at their distance.
+/// Lower doubts pages of text, higher needs flatter paper. [0.9, 0.98]
+inline constexpr float kAliased = 0.96f;
+
 /// A line in which a print's mirror image swaps its sides: u becomes 2 at - u, of the share u of
 /// the width, or of the height if `upright` is false.
 struct Mirror {
@@ -54,10 +61,11 @@ class CellGrid {
   CellGrid(const TrackedPattern& pattern, const PlaneMap& map, std::span<const GrayImage> pyramid,
            int side = kCellSide);
   /// Samples of a cell in the frame, and of its mirror image if there is one, which may be outside
-  /// the outline; false if that is not in the frame.
-  bool see(int cell, CellSamples& seen, const Mirror* mirror = nullptr) const;
-  /// How many times less the frame resolves than the samples of a cell could, 1 or more.
-  [[nodiscard]] double spread() const { return spread_; }
+  /// the outline; false if that is not in the frame. spread: 0: that of the cell.
+  bool see(int cell, CellSamples& seen, const Mirror* mirror = nullptr, double spread = 0) const;
+  /// What a sample averages, in distances between samples: more where the frame resolves less.
+  [[nodiscard]] double spread(int cell) const;
+  [[nodiscard]] double spread_from(double least) const;
   /// What a print, or its mirror image, of any size shows there that fills the outline, to a frame
   /// of that spread().
   static void expect(const TrackedPattern& print, int cell, CellSamples& expected,
@@ -68,9 +76,12 @@ class CellGrid {
   const PlaneMap& map_;
   std::span<const GrayImage> pyramid_;
   int side_;
-  double spread_ = 1;
-  double pixels_ = 1;  ///< of the frame, between samples at that spread
+  double step_;   ///< between samples, of the pattern's pixels
+  double scale_;  ///< of these to the frame's
 };
+
+/// The cells, as bits, of a flat pattern that look different when each sample averages kFootprint.
+std::uint64_t fine_cells(const TrackedPattern& pattern);
 
 /// Two cells compared: correlation, 0 where one of them is flat, and the variance of each.
 struct CellMatch {

@@ -210,7 +210,7 @@ void PoseLoop::State::track_all(TrackResult& result) {
       const auto frame = frame_tracker.frame();
       show(i,
            track.verified ? print_verifier->verify_tracked(i, frame, track)
-                          : print_verifier->verify_found(i, frame, track, track.again),
+                          : print_verifier->verify_found(i, frame, track),
            detection, result);
       track.verified = true;
     } else {
@@ -259,7 +259,7 @@ bool PoseLoop::State::switch_pattern(std::size_t from, std::size_t to, Detection
     return false;
   }
   const PrintVerifier::Verification verification =
-      print_verifier->verify_found(to, frame_tracker.frame(), next, false);
+      print_verifier->verify_found(to, frame_tracker.frame(), next);
   if (verification.reason != Reason::kVisible || verification.actual_pattern >= 0) return false;
   switched.agreeing = verification.agreeing;
   switched.likeness = verification.likeness;
@@ -364,10 +364,9 @@ void PoseLoop::State::accept(TrackResult& result) {
     Reason reason =
         candidate.reason == Reason::kVisible ? Reason::kFailedVerification : candidate.reason;
     if (here) {
-      track.again = before.frames_since_lost < tracker::kRecentFrames;
       PrintVerifier::Verification verification;
       if (track.verified)
-        verification = print_verifier->verify_found(i, frame_tracker.frame(), track, track.again);
+        verification = print_verifier->verify_found(i, frame_tracker.frame(), track);
       track.shown_reason = verification.reason;
       if (resolve_overlap(i, detection, result)) {
         if (!track.verified) verification.reason = before.last_reason;

@@ -32,8 +32,6 @@ constexpr std::uint32_t kDetailStride = 97;  // spreads the cells; coprime to th
 constexpr int kSurePrinted = 2;
 // Cells with detail below which their mean says nothing.
 constexpr int kLeastDetails = 12;
-// How many times less than its samples the frame may resolve.
-constexpr double kResolved = 1.01;
 
 /// Border cells: whether the outer half shows the pattern, or nothing where the pattern shows
 /// nothing: then what differs in the cell does not reach in from outside. True away from the edge,
@@ -122,11 +120,13 @@ void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
                         bool all) {
   if (!print.surface.flat()) return;
   const CellGrid whole(print, map, pyramid, kDetailSide);
-  if (whole.spread() > kResolved) return;
+  if (whole.spread_from(1.0) > 1.0) return;
   const CellGrid quarters(print, map, pyramid, 2 * kDetailSide);
-  const bool closer = quarters.spread() <= kResolved;
+  const bool closer = quarters.spread_from(1.0) <= 1.0;
   CellSamples expected{};
   CellSamples blurred{};
+  CellSamples sharp{};
+  CellSamples sharp_seen{};
   CellSamples seen{};
   for (int tried = 0; tried < kDetailCells && count > 0; ++tried, ++next_) {
     const std::uint32_t at = next_ * kDetailStride % kDetailCells;
@@ -139,7 +139,8 @@ void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
     const int side = part ? 2 * kDetailSide : kDetailSide;
     const int which =
         part ? quarter_of(static_cast<int>(at), cell.quarter - 1) : static_cast<int>(at);
-    if (!(part ? quarters : whole).see(which, seen)) continue;
+    const CellGrid& grid = part ? quarters : whole;
+    if (!grid.see(which, seen, nullptr, 1.0)) continue;
     CellGrid::expect(print, which, expected, nullptr, 1.0, side);
     CellMatch match = compare(expected, seen);
     bool coarse = true;
@@ -147,6 +148,14 @@ void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
       CellGrid::expect(print, which, blurred, nullptr, kBlur, side);
       match.correlation = std::max(match.correlation, compare(blurred, seen).correlation);
       coarse = compare(expected, blurred).correlation >= kCoarse;
+    }
+    if (match.correlation < kDetailAgrees) {  // where samples alias, sharper ones decide
+      CellGrid::expect(print, which, sharp, nullptr, kFootprint, side);
+      if (compare(expected, sharp).correlation < kAliased &&
+          grid.see(which, sharp_seen, nullptr, kFootprint)) {
+        match = compare(sharp, sharp_seen);
+        seen = sharp_seen;
+      }
     }
     if (!part && match.expected_contrast >= kDetailed) {
       cell.likeness = static_cast<std::uint8_t>(1.0f + 99.0f * std::max(0.0f, match.correlation));

@@ -106,7 +106,7 @@ std::uint8_t PrintVerifier::flips_of(std::size_t pattern, const CellGrid& grid, 
   const TrackedPattern& print = patterns_[pattern];
   CellSamples seen{};
   CellSamples expected{};
-  CellGrid::expect(print, at, expected, nullptr, grid.spread());
+  CellGrid::expect(print, at, expected, nullptr, grid.spread(at));
   const bool there = grid.see(at, seen);
   const CellMatch match = there ? compare(expected, seen) : CellMatch{};
   std::uint8_t flips = 0;
@@ -116,7 +116,7 @@ std::uint8_t PrintVerifier::flips_of(std::size_t pattern, const CellGrid& grid, 
     if (mirror.keeps(at)) {
       if (!there) continue;
       CellSamples swapped{};
-      CellGrid::expect(print, at, swapped, &mirror, grid.spread());
+      CellGrid::expect(print, at, swapped, &mirror, grid.spread(at));
       other = compare(swapped, seen);
       if (other.agrees() && match.disagrees()) flips |= kForFlip[k];
     } else {
@@ -134,7 +134,7 @@ void PrintVerifier::update(std::size_t pattern, const CellGrid& grid, const glm:
                            Cell& cell) const {
   CellSamples expected{};
   CellSamples seen{};
-  CellGrid::expect(patterns_[pattern], at, expected, nullptr, grid.spread());
+  CellGrid::expect(patterns_[pattern], at, expected, nullptr, grid.spread(at));
   if (!grid.see(at, seen)) {
     cell = {};
     return;
@@ -176,7 +176,7 @@ bool PrintVerifier::has_slipped(std::size_t pattern, const FrameView& frame,
   for (int at = 0; at < kCells; ++at) {
     const Cell& before = evidence_[pattern].cells[static_cast<std::size_t>(at)];
     if (before.state != CellState::kAgrees || !grid.see(at, seen)) continue;
-    CellGrid::expect(print, at, expected, nullptr, grid.spread());
+    CellGrid::expect(print, at, expected, nullptr, grid.spread(at));
     const CellMatch match = compare(expected, seen);
     if (!match.agrees()) continue;
     ++agreeing;
@@ -383,9 +383,8 @@ std::int32_t PrintVerifier::find_actual_pattern(std::size_t pattern, const Frame
 }
 
 PrintVerifier::Verification PrintVerifier::verify_found(std::size_t pattern, const FrameView& frame,
-                                                        const Track& track, bool again) {
-  Evidence& seen = evidence_[pattern];
-  if (!again) seen = {};
+                                                        const Track& track) {
+  Evidence& seen = evidence_[pattern] = {};
   look(pattern, frame, track, kCells);
   if (agreeing_share(seen) < kItselfShare) {
     place_mirrors(pattern);

@@ -40,10 +40,9 @@ class PrintVerifier {
     double likeness = 0;               ///< mean correlation of these cells, 0 to 1
     std::int32_t actual_pattern = -1;  ///< the pattern that the frame shows instead; -1: none
   };
-  /// Verifies a pattern that a search found in this frame. again: it was lost a moment ago, so the
-  /// evidence from then is kept.
-  Verification verify_found(std::size_t pattern, const FrameView& frame, const Track& track,
-                            bool again);
+  /// Verifies a pattern that a search found in this frame, without evidence from before: another
+  /// print may be there now.
+  Verification verify_found(std::size_t pattern, const FrameView& frame, const Track& track);
   /// Whether a pose has slipped off the pattern: many cells still agree, but less than in the
   /// frames before. (An object that covers the pattern removes cells, and leaves the others
   /// unchanged.)

@@ -40,6 +40,7 @@ struct TrackedPattern {
   std::array<std::span<const TrackerPatchRecord>, kMaxTrackerImageLevels> patches;  ///< by level
   std::array<GrayImage, kMaxTrackerImageLevels> levels;
   int level_count = 0;
+  std::uint64_t fine_cells = 0;  ///< those whose samples alias, see photometry.hpp
   PatternSurface surface;
   /// Of a flat pattern: its plane relative to its picture, by the middle (the axes of
   /// to_world()). Not of the record: while the camera is a guess, what a pose leaves of a measured
