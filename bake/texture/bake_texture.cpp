@@ -14,8 +14,8 @@
 namespace modar {
 namespace {
 
-/// Level 0 of a small image below it is encoded enlarged as well. Lower: palettes get wrong
-/// colours; higher: bundles grow for what few people see. [30, 40] dB
+/// PSNR below which small images are encoded enlarged as well. Lower: palettes get wrong colours;
+/// higher: bundles grow for what few people see. [30, 40]
 constexpr double kPoorPsnr = 36;
 /// Gain for which the enlarged one is stored, in sixteen times the bytes. [3, 10] dB
 constexpr double kEnlargedGain = 6;

@@ -18,8 +18,8 @@
 namespace modar {
 namespace {
 
-/// Rms by which WebP may change a block of 16 by 16 pixels. Lower: fine saturated patterns are
-/// refused; higher: damaged blocks pass. [40, 80] gray values
+/// Rms gray difference that WebP may make in a block. Lower: fine saturated patterns are refused;
+/// higher: damaged blocks pass. [40, 80]
 constexpr double kMostBlockRms = 60;
 /// Difference of a cell's colour from the small picture's, as the root of linear light. Lower:
 /// stripes of pure colours are refused. [0.2, 0.4]
