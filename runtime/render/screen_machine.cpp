@@ -8,17 +8,17 @@
 namespace modar {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+constexpr double kDegree = 3.14159265358979323846 / 180;
 /// A finger that moves less than this share of the screen's smaller side taps.
 constexpr double kSlip = 0.015;
 /// Radians a press.
-constexpr double kTurnStep = kPi / 18;
+constexpr double kTurnStep = 10 * kDegree;
 constexpr double kSizeStep = 0.1;
 constexpr double kLeastZoom = 0.2;
 constexpr double kMostZoom = 5;
 /// Radians: not from below the pattern, and not so high that "up" is lost.
-constexpr double kLeastTilt = 8 * kPi / 180;
-constexpr double kMostTilt = 86 * kPi / 180;
+constexpr double kLeastTilt = 8 * kDegree;
+constexpr double kMostTilt = 86 * kDegree;
 /// Seconds of the first turn. Anything that moves longer needs a button to pause it.
 constexpr double kPresentSeconds = 4;
 /// Seconds without a pattern until the visitor reads why. Shorter ones flicker.
@@ -68,8 +68,8 @@ int ScreenMachine::touch(const modar_touch& touch) {
   if (tap_) return MODAR_NOTHING;
   const double before = length(finger.x - other.x, finger.y - other.y);
   if (!other.down) {
-    turntable_.turn += 2 * kPi * (touch.x - finger.x) / touch.width;
-    turntable_.tilt += kPi * (touch.y - finger.y) / touch.height;
+    turntable_.turn += 360 * kDegree * (touch.x - finger.x) / touch.width;
+    turntable_.tilt += 180 * kDegree * (touch.y - finger.y) / touch.height;
   } else if (before > 0) {
     turntable_.zoom *= length(touch.x - other.x, touch.y - other.y) / before;
   }
@@ -96,7 +96,7 @@ void ScreenMachine::press(int button, double steps) {
 /// Nothing moves by itself any more.
 void ScreenMachine::limit() {
   presents_ = false;
-  turntable_.turn -= 2 * kPi * std::floor(turntable_.turn / (2 * kPi));
+  turntable_.turn -= 360 * kDegree * std::floor(turntable_.turn / (360 * kDegree));
   turntable_.tilt = std::clamp(turntable_.tilt, kLeastTilt, kMostTilt);
   turntable_.zoom = std::clamp(turntable_.zoom, kLeastZoom, kMostZoom);
 }
@@ -151,7 +151,7 @@ std::span<const SceneCommand> ScreenMachine::step(double time_s,
 modar_turntable ScreenMachine::turntable(double time_s) {
   if (presents_) {
     const double rest = 1 - std::clamp((time_s - since_) / kPresentSeconds, 0.0, 1.0);
-    turntable_.turn = 2 * kPi * (1 - rest * rest * rest);
+    turntable_.turn = 360 * kDegree * (1 - rest * rest * rest);
     presents_ = rest > 0;
   }
   return turntable_;

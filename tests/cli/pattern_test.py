@@ -182,8 +182,8 @@ class Pattern(ProgramTest):
     @unittest.skipUnless(shutil.which("ffmpeg"), "no ffmpeg")
     def test_confusion_says_whom_one_bundle_tells_apart(self):
         other = self.folder / "edition.png"
-        subprocess.run(["ffmpeg", "-v", "error", "-y", "-i", self.part, "-vf", "split[a][b];[b]crop=iw:ih*2/5:0:ih*3/5,hflip,vflip[c];"
-                        "[a][c]overlay=0:H*3/5", "-frames:v", "1", other], check=True)
+        subprocess.run(["ffmpeg", "-v", "error", "-y", "-i", self.part, "-vf", "split[a][b];[b]crop=iw:ih/4:0:ih*3/4,hflip,vflip[c];"
+                        "[a][c]overlay=0:H*3/4", "-frames:v", "1", other], check=True)
         for name, picture in (("a", self.part), ("b", other)):
             done = self.modar("bake", "--pattern", picture, "-o", f"{name}.modar", "--quiet", *QUICK)
             self.assertEqual(done.returncode, 0, done.stderr)
