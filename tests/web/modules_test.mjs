@@ -109,7 +109,7 @@ test('calls of the page reach the engine', () => {
   new Float32Array(heap.buffer, 80, 3).set([1.5, 2.5, 1]);
   new Float32Array(heap.buffer, 128, 6).set([1, 2, 3, 4, 5, 6]);
   engine.setCamera(4, 3, 5);
-  engine.draw(40, 30, { mirror: true, turn: 0.5, size: 2 });
+  engine.draw(40, 30, true);
   engine.draw(40, 30);
   assert.deepEqual(engine.pick(40, 30, true, 1, 2), { node: 7, material: 9 });
   engine.pick(40, 30, false, 1, 2);
@@ -118,7 +118,7 @@ test('calls of the page reach the engine', () => {
   assert.deepEqual(engine.bounds(5), { low: [1, 2, 3], high: [4, 5, 6] });
   engine.track(true, 9, false);
   engine.turn([1, 2, 3]);
-  assert.deepEqual(calls, [['camera', 4, 3, 5], ['draw', 40, 30, 1, 0.5, 2], ['draw', 40, 30, 0, 0, 1], ['pick', 40, 30, 1, 1, 2],
+  assert.deepEqual(calls, [['camera', 4, 3, 5], ['draw', 40, 30, 1], ['draw', 40, 30, 0], ['pick', 40, 30, 1, 1, 2],
     ['pick', 40, 30, 0, 1, 2], ['label', 3, 40, 30, 1, 0], ['label', 3, 40, 30, 0, 1], ['bounds', 5], ['track', 1, 9, 0], ['turn', 1, 2, 3]]);
   calls.length = 0;
   // A larger buffer takes the place of a smaller one, which serves until then.

@@ -59,8 +59,11 @@ function bundle(file) {
   return join2({ lines: [`import { ${[...shared].join(', ')} } from './${SHARED}';`], from: [null] }, all);
 }
 
-/** Emscripten writes a function for each export, which replaces itself when it is called: one loop does it. */
-const bareEngine = (text) => text.replace(/var _web_\w+ = Module\["_web_\w+"\] = function\(\) \{\n[^\n]*\n\};\n/g, '')
+/**
+ * Emscripten writes a function for each export, which replaces itself when it is called: one loop does it. Of the extensions
+ * that it wraps, the renderer uses instances alone.
+ */
+const bareEngine = (text) => text.replace(/\b__webgl_enable_(?!ANGLE)\w+\(GLctx\);/g, '').replace(/var _web_\w+ = Module\["_web_\w+"\] = function\(\) \{\n[^\n]*\n\};\n/g, '')
   .replace("Module['asm'] = exports;", "$&\nfor (const name in exports) Module['_' + name] = exports[name];");
 
 const DIGITS = 'ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/';
