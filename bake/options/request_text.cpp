@@ -555,7 +555,14 @@ Result<PatternRequest> parse_pattern(const std::string& text) {
   const std::string_view tail = std::string_view(text).substr(colon + 1);
   const auto width = parse_millimetres(tail);
   if (!width) {
-    if (!looks_like_length(tail) || is_file(text)) return request;
+    if (is_file(text)) return request;
+    const std::string before = text.substr(0, colon);
+    if (!looks_like_length(tail)) {
+      if (!is_file(split_name(before).second)) return request;
+      return fail(ExitCode::kUsage, "cli.pattern", "--pattern " + text,
+                  "'" + std::string(tail) + "' is neither a width nor a shape",
+                  "write " + before + ":210mm for a width, or " + before + ":shape=SHAPE");
+    }
     return fail(ExitCode::kUsage, "cli.pattern", "--pattern " + text,
                 "'" + std::string(tail) + "' is not a width: " + width.error().cause,
                 width.error().cure);

@@ -536,6 +536,8 @@ class Help(ProgramTest):
         for width in ("nanmm", "infmm", "1e39mm", "1e-39mm", "1e300m", "0mm", "-1mm"):
             done = self.modar("bake", "--pattern", f"{COVER}:{width}", "-o", "x.modar")
             self.assert_fails(done, 1, "cli.pattern", width)
+        done = self.modar("bake", "--pattern", f"{COVER}:width=20cm", "-o", "a.modar")
+        self.assert_fails(done, 1, "'width=20cm' is neither a width nor a shape; write", "cover.png:210mm")
         for part in ("scale=1e39", "scale=nan", "scale=1e-30", "height=1e39mm", "height=nanmm", "width=1e-39mm", "offset=1e39:0:0"):
             done = self.modar("bake", "--model", POTTERY, "--pattern", f"{COVER}:210mm", "--scene", f"cover=pottery,{part}", "-o", "x.modar")
             self.assert_fails(done, 1, "cli.scene", part)
