@@ -166,8 +166,7 @@ void PrintDetails::look(const TrackedPattern& print, const PlaneMap& map,
       cell.edge_agrees = edge_agrees(static_cast<int>(at), expected, seen);
     }
     // At the print's edge the half there must agree before, or a quarter would let in all that is
-    // connected with it. `--lookalikes --only family --frames 2`: another title is shown in 16 % of
-    // the frames after two seconds, 31 % without quarters; no true print hides.
+    // connected with it.
     if (part || (!coarse && closer && cell.edge_agrees)) next_quarter(cell);
   }
 }
