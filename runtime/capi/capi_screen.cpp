@@ -221,6 +221,7 @@ int modar_screen_touch(modar_screen* screen, const modar_touch* touch) {
 
 void modar_screen_press(modar_screen* screen, int button, double steps) {
   if (screen == nullptr || !modar::usable(steps)) return;
+  if (button < MODAR_TURN || button > MODAR_CAPTIONS_SHOWN) return;
   screen->machine.press(button, steps);
 }
 

@@ -1,4 +1,5 @@
 // The screen through the C API: what fingers, keys and time do to the models and to the eye.
+#include <array>
 #include <cstring>
 #include <numbers>
 #include <optional>
@@ -140,6 +141,19 @@ TEST_F(ScreenTest, KeysAndButtonsDoTheSameInSteps) {
   EXPECT_EQ(at().turn, 0);
   EXPECT_NEAR(at().tilt * 180 / kPi, 32, 1e-9);
   EXPECT_EQ(at().zoom, 1);
+}
+
+TEST_F(ScreenTest, ButtonsThatAreNoneDoNothing) {
+  const auto switches = [this] {
+    return std::array{status().sound, status().paused, status().captions};
+  };
+  const auto before = switches();
+  for (const int button : {MODAR_TURN - 1, MODAR_CAPTIONS_SHOWN + 1, 99}) {
+    modar_screen_press(screen_, button, 1);
+    EXPECT_EQ(switches(), before) << button;
+  }
+  modar_screen_press(screen_, MODAR_CAPTIONS_SHOWN, 1);
+  EXPECT_EQ(switches()[2], 1 - before[2]);
 }
 
 TEST_F(ScreenTest, ModelsTurnAndGrowAboutTheirFeetAndPicturesStay) {

@@ -158,8 +158,8 @@ Result<void> find_picture(PatternRequest& pattern, std::vector<Diagnostic>& said
         pattern_sides(static_cast<int>(photo.image.width), static_cast<int>(photo.image.height));
     if (!is_pattern_size(width, height)) {
       return fail(ExitCode::kInvalidInput, "pattern.loop-size", pattern.path,
-                  "the picture has " + std::to_string(width) + "x" + std::to_string(height) +
-                      " pixels where its longer side has at most 720, and 32 are needed",
+                  "reduced to 720 pixels at most, the picture is " + std::to_string(width) + "x" +
+                      std::to_string(height) + ", and each side needs 32",
                   "give a larger picture, or crop it closer to a square");
     }
   }

@@ -575,7 +575,8 @@ enum {
   MODAR_PAUSED = 5,
   MODAR_CAPTIONS_SHOWN = 6,
 };
-/* A key or a button. steps: presses, or parts of one; negative ones in the other direction. */
+/* A key or a button; others do nothing. steps: presses, or parts of one; negative ones in the other
+ * direction. */
 MODAR_EXPERIMENTAL void modar_screen_press(modar_screen* screen, int button, double steps);
 /* A look without a camera from now on, until modar_screen_reset(): gestures move the eye, and
  * modar_screen_items() leaves models as baked. present: 1: in the first four seconds it goes once
