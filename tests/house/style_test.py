@@ -8,7 +8,7 @@ import unittest
 
 ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
 ROOMS = ("formats", "bake", "runtime", "tests")
-PAGES = ("runtime/extensions/web", "bake/extensions/studio/page")
+PAGES = ("runtime/extensions/web", "runtime/extensions/web/adapters", "bake/extensions/studio/page")
 
 
 def files(*suffixes):

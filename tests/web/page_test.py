@@ -1150,45 +1150,6 @@ class Page(ProgramTest):
           .then((bytes) => crypto.subtle.digest('SHA-256', bytes)).then((hash) => Array.from(new Uint8Array(hash)))""")
         self.assertEqual(bytes(hashed), hashlib.sha256(packed).digest())
 
-    def test_the_package_installs_and_three_js_draws_on_a_picture(self):
-        npm, project = shutil.which("npm"), self.site / "project"
-        if npm is None:
-            self.skipTest("no npm")
-        project.mkdir()
-        run = lambda *words: subprocess.run([npm, *words], cwd=project, capture_output=True, text=True)
-        packed = run("pack", "--silent", PAGE)
-        self.assertEqual(packed.returncode, 0, packed.stderr)
-        (project / "package.json").write_text('{"name": "museum", "private": true}')
-        installed = run("install", "--no-audit", "--no-fund", packed.stdout.strip(), "three@0.160.0")
-        if installed.returncode != 0:
-            self.skipTest("npm cannot fetch three.js: " + installed.stderr[-200:])
-        shutil.copy(ROOT / "runtime" / "extensions" / "web" / "example" / "three.html", project)
-        shutil.copy(self.bundle, project)
-        # The cube's green over the middle of the picture, by the corners that the tracker states, and the tracked frame around it:
-        # also on a phone, where the frame is cropped.
-        for size in ((640, 480), (390, 844)):
-            self.browser.resize(*size, 2, True)
-            self.browser.open(self.server.url + "project/three.html")
-            self.browser.wait("globalThis.detection !== undefined", "a detection")
-            self.browser.wait("""new Promise((resolve) => requestAnimationFrame(() => {
-              const { corners, camera } = detection;
-              const mean = (first) => (corners[first] + corners[first + 2] + corners[first + 4] + corners[first + 6]) / 4;
-              const [picture, models] = document.querySelectorAll('canvas');
-              const copy = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
-              const { width, height } = Object.assign(copy.canvas, { width: models.width, height: models.height });
-              const cover = Math.max(width / camera.width, height / camera.height);
-              const x = width / 2 + cover * (mean(0) - camera.width / 2), y = height / 2 + cover * (mean(1) - camera.height / 2);
-              const mixed = (canvas) => {
-                copy.clearRect(0, 0, width, height);
-                copy.drawImage(canvas, 0, 0);
-                return copy.getImageData(x, y, 1, 1).data;
-              };
-              const [r, g, b] = mixed(models);
-              const frame = mixed(picture);
-              resolve(g > 200 && r < 50 && b < 50 && picture.width === width && frame[3] === 255 && Math.max(...frame.slice(0, 3)) > 20);
-            }))""", f"the cube at {size}")
-        self.assertEqual(self.browser.errors, [])
-
 
 class Updates(ProgramTest):
     """A page with a release folder: its downloads, and its refusals."""
