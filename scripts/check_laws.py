@@ -88,7 +88,7 @@ def standard_header(name):
 # Rooms of the workstation from the bottom up: each includes those before it, and of its own rank itself only.
 BAKE_ROOMS = (("bake/process",), ("bake", "bake/memory"), ("bake/io",), ("bake/image",), ("bake/import", "bake/video"), ("bake/mesh",),
               ("bake/texture", "bake/pattern"), ("bake/options",), ("bake/bundle", "bake/export", "bake/ship"),
-              ("bake/check",), ("bake/project",), ("bake/commands",), ("bake/extensions/web", "bake/extensions/report"), ("bake/extensions/studio",), ("bake/extensions/lab",))
+              ("bake/check",), ("bake/project",), ("bake/commands",), ("bake/extensions/web", "bake/extensions/adopt", "bake/extensions/report"), ("bake/extensions/studio",), ("bake/extensions/lab",))
 RANK = {room: rank for rank, rooms in enumerate(BAKE_ROOMS) for room in rooms}
 # The doors of the rooms: the headers that other rooms may include. Those of bake/memory and below
 # are for all. The lab measures the inside, and may include everything below it; what it alone
@@ -121,6 +121,7 @@ DOORS = {
     "bake/ship/http": ("http_reader.hpp",),
     "bake/ship/keys": ("keys.hpp", "root_draft.hpp"),
     "bake/extensions/web": ("site.hpp", "serve.hpp"),
+    "bake/extensions/adopt": (),
     "bake/check": ("verdict.hpp", "text_check.hpp"),
     "bake/check/content": ("content_check.hpp",),
     "bake/check/device": ("device_rules.hpp", "device_file.hpp"),
@@ -147,7 +148,7 @@ DOORS = {
     "runtime/extensions/web": (),
 }
 # Extensions, each with an option of CMake: only extensions and tests include them.
-EXTENSIONS = ("bake/extensions/web", "bake/extensions/report", "bake/extensions/studio", "bake/extensions/lab", "runtime/extensions/paper", "runtime/extensions/web", "runtime/extensions/android")
+EXTENSIONS = ("bake/extensions/web", "bake/extensions/adopt", "bake/extensions/report", "bake/extensions/studio", "bake/extensions/lab", "runtime/extensions/paper", "runtime/extensions/web", "runtime/extensions/android")
 # Larger rooms are divided rather than given more doors.
 MOST_DOORS = 3
 

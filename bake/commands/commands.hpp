@@ -16,6 +16,7 @@ void add_init(CommandLine& program);
 void add_cache(CommandLine& program);
 void add_plan(CommandLine& program);
 void add_report(CommandLine& program);
+void add_adopt(CommandLine& program);
 void add_studio(CommandLine& program);
 void add_web(CommandLine& program);
 void add_document(CommandLine& program);

@@ -29,6 +29,9 @@ int main(int argc, char** argv) {
     program.group("Look closer", modar::Shown::kInFull);
     modar::add_inspect(program);
     modar::add_calibrate(program);
+#ifdef MODAR_HAS_ADOPT
+    modar::add_adopt(program);
+#endif
     program.group("Build servers and releases", modar::Shown::kInFull);
     modar::add_ship(program);
     modar::add_plan(program);

@@ -5,14 +5,16 @@ import os
 import pathlib
 import re
 import shutil
+import struct
 import subprocess
 import sys
+import tarfile
 import tempfile
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 from browser import Browser, Quiet, Server  # noqa: E402
-from programs import BIN, ROOT  # noqa: E402
+from programs import BIN, COVER, ROOT  # noqa: E402
 
 PAGE = ROOT / "build" / "web" / "web"
 ADAPTERS = ROOT / "runtime" / "extensions" / "web" / "adapters"
@@ -22,6 +24,7 @@ NODE = tuple(int(part) for part in subprocess.run(["node", "-p", "process.versio
 TOOLS = {"vite": "^7" if NODE >= (20, 19) else "^6", "three": "^0.180", "react": "^19", "react-dom": "^19", "@react-three/fiber": "^9",
          "@babylonjs/core": "^8", "playcanvas": "^2", "typescript": "~5.6", "@types/react": "^19", "@types/three": "^0.180"}
 FRAMES = 12
+COVER_SIZE = struct.unpack(">II", COVER.read_bytes()[16:24])
 # Frames as the worker gets them, and after each event the print's matrix in eye space, as the engine has it.
 RECORD = """(() => {
   localStorage.clear();
@@ -35,6 +38,14 @@ RECORD = """(() => {
     three: () => (camera.updateMatrixWorld(), cover.updateMatrixWorld(true), [cover.visible, camera.matrixWorldInverse.clone().multiply(cover.matrixWorld).elements]),
     fiber: () => ways.three(),
     babylon: () => [cover.isEnabled(), cover.computeWorldMatrix(true).multiply(camera.getViewMatrix(true)).asArray()],
+    aframe: () => {
+      const {camera} = document.querySelector('a-scene'), {object3D} = document.getElementById('cover');
+      camera.updateMatrixWorld();
+      object3D.updateMatrixWorld(true);
+      return [object3D.visible, camera.matrixWorldInverse.clone().multiply(object3D.matrixWorld).elements];
+    },
+    mindar: () => ways.aframe(),
+    wall: () => ways.aframe(),
     playcanvas: () => {
       const eye = camera.getWorldTransform().clone().invert();
       return [cover.enabled, eye.mul2(eye, cover.getWorldTransform()).data];
@@ -108,6 +119,25 @@ export const Scene3 = () =>
 """
 
 
+FRAME = """<!doctype html><link rel="icon" href="data:,"><script src="aframe.min.js"></script>%s
+<script>
+  globalThis.events = [];
+  for (const type of ['arReady', 'arError', 'targetFound', 'targetLost', 'xrimagescanning', 'realityready', 'xrimagefound', 'xrimageupdated', 'xrimagelost'])
+    document.addEventListener(type, ({type, detail}) => { events.push(type); if (type === 'xrimagefound') globalThis.wallDetail = detail; });
+</script>"""
+BOX = '<a-box position="0 0 %s" scale="%s %s %s" material="shader: flat; color: #0f0"></a-box>'
+CAMERA = '<a-camera position="0 0 0" look-controls="enabled: false" wasd-controls="enabled: false"></a-camera>'
+MINDAR = f"""<script src="modar/adapters/aframe.js"></script>
+<a-scene mindar-image="imageTargetSrc: demo.modar; filterMinCF: 1; filterBeta: 10000; missTolerance: 3" vr-mode-ui="enabled: false">{CAMERA}
+<a-entity id="cover" mindar-image-target="targetIndex: 0">{BOX % (0.15, 0.3, 0.3, 0.3)}</a-entity></a-scene>"""
+MARKUP = {"mindar": MINDAR, "mind": MINDAR.replace("demo.modar", "targets.mind"),
+          "wall": f"""<script src="modar/adapters/aframe.js" data-bundle="demo.modar"></script>
+<a-scene xrweb="disableWorldTracking: true" vr-mode-ui="enabled: false"><a-camera position="0 4 10"></a-camera>
+<xrextras-named-image-target id="cover" name="cover">{BOX % (0.15, 0.3, 0.3, 0.3)}</xrextras-named-image-target></a-scene>"""}
+EVENTS = {"mindar": ["arReady", "targetFound", "targetLost"],
+          "wall": ["xrimagescanning", "realityready", "xrimagefound", "xrimageupdated", "xrimagelost"]}
+
+
 class Shared(Quiet):
     """Of another origin, as a CDN."""
 
@@ -164,7 +194,7 @@ class Adapters(unittest.TestCase):
         done = subprocess.run(["node", self.base / "node_modules" / package / program, *words], cwd=self.base, capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
-    def assert_follows(self, url, name):
+    def assert_follows(self, url, name, placed=lambda view: view, delta=1e-5, scale=1):
         self.browser.errors.clear()
         self.browser.open(f"{url}{name}.html")
         self.browser.wait(f"told.length === {FRAMES}", f"{FRAMES} frames of {name}")
@@ -178,13 +208,13 @@ class Adapters(unittest.TestCase):
         for each, play in zip(told, expected, strict=True):
             # A print is shown from its third frame on.
             for seen in play["visible"] if each.get("shown") else ():
-                for got, wanted in zip(each["matrix"], view_of(seen), strict=True):
-                    self.assertAlmostEqual(got, wanted, delta=1e-5, msg=name)
+                for got, wanted in zip(each["matrix"], placed(view_of(seen)), strict=True):
+                    self.assertAlmostEqual(got / scale, wanted / scale, delta=delta, msg=name)
                 compared += 1
         self.assertGreater(compared, 4, name)
         self.browser.wait(GREEN, "the cube")
         green = next(filter(None, (self.browser.run(GREEN) for _ in range(50))))
-        self.browser.run("tracker.stop(), tracker.dispatchEvent(new CustomEvent('lost', {detail: {name: 'cover'}}))")
+        self.browser.run("tracker.stop(), tracker.dispatchEvent(new CustomEvent('lost', {detail: {name: 'cover', pattern: 0}}))")
         self.assertFalse(self.browser.run("way()[0]"), name)
         if keep := os.environ.get("MODAR_KEEP"):
             self.browser.screenshot(pathlib.Path(keep) / f"{name}.png")
@@ -244,6 +274,41 @@ class Adapters(unittest.TestCase):
             with self.subTest(name):
                 self.assert_follows(server.url, name)
         self.assert_component(server.url)
+
+    def test_a_frame(self):
+        """Our own markup, and that of pages for MindAR and 8th Wall after `modar adopt`: matrices and the order of events."""
+        packed = subprocess.run(["npm", "pack", "--silent", "aframe@1.7"], cwd=self.base, capture_output=True, text=True)
+        if packed.returncode != 0:
+            self.skipTest("npm cannot fetch A-Frame: " + packed.stderr[-200:])
+        with tarfile.open(self.base / packed.stdout.strip().splitlines()[-1]) as tar:
+            minified = next(name for name in tar.getnames() if re.fullmatch(r"package/dist/aframe-v[\d.]+\.min\.js", name))
+            (self.base / "aframe.min.js").write_bytes(tar.extractfile(minified).read())
+        for name, text in MARKUP.items():
+            (self.base / f"{name}.html").write_text(FRAME % text)
+        (self.base / "modar").symlink_to(self.base / "node_modules" / "modar")
+        server = Server(self.base)
+        self.addCleanup(server.close)
+        self.assert_follows(server.url, "aframe")
+        width = 2 * COVER_SIZE[0] / COVER_SIZE[1]
+        # An entity's unit is the picture's width, which is 1000 units of the scene.
+        self.assert_follows(server.url, "mindar", lambda view: [
+            1000 * number / (width if i in (12, 13, 14) else 1) if i % 4 < 3 else number for i, number in enumerate(view)], scale=1000)
+        # A position and a rotation, with the longer side as unit: what a wrong focal length stretches is not in them.
+        self.assert_follows(server.url, "wall", lambda view: [2 * number if i < 12 else number for i, number in enumerate(view)], delta=0.1)
+        for name, expected in EVENTS.items():
+            with self.subTest(name):
+                self.browser.open(f"{server.url}{name}.html")
+                self.browser.wait(f"events.length > {len(expected) - 2}", "events")
+                self.browser.run("tracker.stop(), tracker.dispatchEvent(new CustomEvent('lost', {detail: {name: 'cover', pattern: 0}}))")
+                seen = self.browser.run("events")
+                self.assertEqual([*dict.fromkeys(seen)], expected)
+                self.assertEqual((seen[0], seen[-1]), (expected[0], expected[-1]))
+        self.assertEqual(self.browser.run("[wallDetail.scaledWidth.toFixed(3), wallDetail.scaledHeight.toFixed(3), wallDetail.scale]"),
+                         [f"{COVER_SIZE[0] / COVER_SIZE[1]:.3f}", "1.000", 2])
+        self.browser.open(server.url + "mind.html")
+        self.browser.wait("events.length > 0", "the error")
+        self.assertEqual(self.browser.run("events"), ["arError"])
+        self.assertIn("modar adopt", self.browser.run("document.querySelector('.mindar-ui-overlay:not(.hidden)').textContent"))
 
     def test_strict_types(self):
         (self.base / "typed.tsx").write_text(TYPED)

@@ -1,4 +1,4 @@
-import type { load, Modar } from '../modar.js';
+import type { load, Modar, ModarEvents } from '../modar.js';
 
 /** Of load() and of Modar.start(), and: */
 export type FollowOptions = Parameters<typeof load>[1] & Parameters<Modar['start']>[1] & {
@@ -21,7 +21,7 @@ export interface Engine {
   near?: number;
   far?: number;
   /** view: pattern space to GL's eye space, column-major; null: the pattern is not shown. */
-  place(name: string, view: Float32Array | null): void;
+  place(name: string, view: Float32Array | null, detail: ModarEvents['updated' | 'lost']['detail']): void;
   /** After the frame's picture was drawn. size: of the canvas, pixels. */
   draw(size: { width: number; height: number }, projection: Float32Array): void;
 }

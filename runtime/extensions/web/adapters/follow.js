@@ -45,8 +45,8 @@ export async function follow(bundle, engine, {video: own, ...options} = {}) {
   const camera = own ? null : new Camera();
   const video = own ?? hiddenVideo(canvas);
   const picture = pictureBelow(canvas);
-  modar.addEventListener('updated', ({detail}) => engine.place(detail.name, detail.view));
-  modar.addEventListener('lost', ({detail}) => engine.place(detail.name, null));
+  modar.addEventListener('updated', ({detail}) => engine.place(detail.name, detail.view, detail));
+  modar.addEventListener('lost', ({detail}) => engine.place(detail.name, null, detail));
   modar.addEventListener('frame', ({detail}) => {
     for (const side of /** @type {const} */ (['Left', 'Top', 'Width', 'Height']))
       picture.style.setProperty(side.toLowerCase(), `${canvas[`offset${side}`]}px`);
