@@ -32,7 +32,10 @@ if(MODAR_PACKAGES)
     modar_formats modar_fetch)
   add_custom_target(modar_package_files ALL DEPENDS ${share}/man/man1/modar.1.gz ${clip}/clip.mp4)
   add_dependencies(modar_package_files modar_notices)
-  foreach(package workstation:modar player:modar-player laboratory:modar-lab library:libmodar0 development:libmodar-dev)
+  if(MODAR_PYTHON)
+    set(python_package python:python3-modar)
+  endif()
+  foreach(package workstation:modar player:modar-player laboratory:modar-lab library:libmodar0 development:libmodar-dev ${python_package})
     string(REGEX MATCH "^(.*):(.*)$" parts ${package})
     install(FILES ${notices}/copyright ${notices}/changelog.gz
       DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${CMAKE_MATCH_2} COMPONENT ${CMAKE_MATCH_1})
@@ -99,4 +102,15 @@ Static libraries of tracker, renderer and installer, headers in C and C++,
 files for CMake and pkg-config, and an example in C.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
   "libmodar0 (= ${PROJECT_VERSION}), libegl-dev, libgles-dev, libglm-dev, libexpected-dev, libsodium-dev, libzstd-dev, libmeshoptimizer-dev")
+if(MODAR_PYTHON)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-modar)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_ARCHITECTURE all)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3, python3-numpy, libmodar0 (>= ${PROJECT_VERSION})")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS modar)
+  set(CPACK_COMPONENT_PYTHON_DESCRIPTION "ModAR for Python 3
+Bundles as numpy arrays, the tracker, the renderer, and the commands that bake
+and check.")
+endif()
 include(CPack)

@@ -18,7 +18,7 @@ BIN = pathlib.Path(os.environ.get("MODAR_BIN_DIR", ROOT / "build" / "dev" / "bin
 POTTERY = ROOT / "assets" / "models" / "pottery.obj"
 STATUE = ROOT / "assets" / "models" / "statue.obj"
 COVER = ROOT / "assets" / "patterns" / "cover.png"
-EXTENSIONS = os.environ.get("MODAR_EXTENSIONS", "web,adopt,report,studio,lab,paper,android").split(",")
+EXTENSIONS = os.environ.get("MODAR_EXTENSIONS", "web,adopt,report,studio,lab,python,paper,android").split(",")
 
 
 def needs(extension):
