@@ -67,7 +67,7 @@ def frame_of(plane):
 
 
 def box_of(things, to_pattern):
-    """The least and greatest corner of all their vertices in pattern space, as they are drawn in this frame."""
+    """The least and greatest corner of all their vertices in pattern space, with modifiers, in this frame."""
     graph, points = bpy.context.evaluated_depsgraph_get(), []
     for thing in things:
         drawn = thing.evaluated_get(graph)
