@@ -1,4 +1,4 @@
-"""The C API in Python and C#: what libmodar.so says there is what modar-play says."""
+"""The C API in Python, C# and Godot: what libmodar.so says there is what modar-play says."""
 import json
 import os
 import pathlib
@@ -14,6 +14,8 @@ from programs import BIN, COVER, POTTERY, QUICK, ROOT, ProgramTest, demo_files
 LIBRARY = ROOT / "build" / "device" / "runtime" / "capi"
 HEADER = ROOT / "runtime" / "include" / "modar" / "modar.h"
 PYTHON = ROOT / "runtime" / "extensions" / "python"
+GODOT = ROOT / "runtime" / "extensions" / "godot"
+GODOT_HEADERS = os.environ.get("MODAR_GODOT_HEADERS")
 CSHARP = ROOT / "runtime" / "extensions" / "csharp"
 WIDTH, HEIGHT = 480, 360
 
@@ -110,6 +112,33 @@ class Languages(ProgramTest):
                                 capture_output=True, text=True)
         self.assertEqual(failed.returncode, 3)
         self.assertIn("[bundle.magic]", failed.stderr)
+
+
+    @unittest.skipUnless(GODOT_HEADERS and shutil.which("godot3-server"), "no godot3-server, or MODAR_GODOT_HEADERS does not name its headers")
+    def test_godot(self):
+        project = self.folder / "project"
+        shutil.copytree(GODOT / "example", project)
+        shutil.copy(self.bundle, project)
+        shutil.copy(self.frames, project)
+        self.assert_runs("cc", "-std=c11", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared", "-I", GODOT_HEADERS, "-I", HEADER.parents[1],
+                         GODOT / "modar_godot.c", "-L", LIBRARY, "-lmodar", "-o", project / "libmodar_godot.so")
+        self.environment["HOME"] = str(self.folder)
+        told = self.assert_runs("godot3-server", "--path", project).splitlines()
+        self.assertEqual([line for line in told if line.startswith(("found", "lost", "error"))], ["found cover"])
+        places = [line.removeprefix("place ").partition(" ") for line in told if line.startswith("place ")]
+        self.assertEqual(len(places), len(self.played))
+        compared = 0
+        for (shown, _, numbers), played in zip(places, self.played):
+            if shown == "True" and played:
+                x, y, z, origin = ([float(n) for n in part.split(",")] for part in re.findall(r"Vector3\(([^)]*)\)", numbers))
+                stretch = played.get("stretch") or [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
+                columns = [[sum(played["rotation"][3 * row + k] * stretch[4 * k + column] for k in range(3)) for row in range(3)] for column in range(4)]
+                columns[3] = [a + b for a, b in zip(columns[3], played["translation"])]
+                for column, wanted in zip((x, y, z, origin), columns, strict=True):
+                    for got, number, sign in zip(column, wanted, (1, -1, -1), strict=True):
+                        self.assertAlmostEqual(got, sign * number, delta=1e-4)
+                compared += 1
+        self.assertGreater(compared, 5)
 
 
 CHECKS = """
