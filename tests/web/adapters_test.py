@@ -23,7 +23,7 @@ NODE = tuple(int(part) for part in subprocess.run(["node", "-p", "process.versio
     if shutil.which("node") else ()
 TOOLS = {"vite": "^7" if NODE >= (20, 19) else "^6", "three": "^0.180", "react": "^19", "react-dom": "^19", "@react-three/fiber": "^9",
          "@babylonjs/core": "^8", "playcanvas": "^2", "typescript": "~5.6", "@types/react": "^19", "@types/three": "^0.180"}
-FRAMES = 12
+FRAMES = 20
 COVER_SIZE = struct.unpack(">II", COVER.read_bytes()[16:24])
 # Frames as the worker gets them, and after each event the print's matrix in eye space, as the engine has it.
 RECORD = """(() => {
