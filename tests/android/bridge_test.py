@@ -15,7 +15,7 @@ from machine import (APP, FAKES, FRAMES, HEIGHT, ROOT, SOAK, WIDTH, ProgramTest,
 from film_project import FILM_FPS, FILM_FRAMES, bake_film, make_frames  # noqa: E402
 from programs import COVERED, READINGS, SEEN, TURNED, TURNS, write_turns  # noqa: E402
 
-BRIDGE = ["Native", "ModarException", "Poses", "Gyroscope", "Media", "VideoCopy"]
+BRIDGE = ["Native", "ModarException", "Poses", "Gyroscope", "Media", "VideoCopy", "Frame", "FrameHandover"]
 SENSORS = ["hardware/Sensor", "hardware/SensorEvent", "hardware/SensorEventListener", "hardware/SensorManager", "os/Handler",
            "os/Looper", "os/Message", "media/MediaPlayer", "media/MediaExtractor", "media/MediaFormat", "media/MediaCodec", "media/MediaCrypto",
            "graphics/SurfaceTexture", "view/Surface", "opengl/GLES20", "opengl/GLES11Ext"]
@@ -60,6 +60,9 @@ class Bridge(ProgramTest):
 
     def play(self, bundle, *more, clip=None):
         return self.run_program("modar-play", bundle, "--input", f"nv21:{WIDTH}x{HEIGHT}@30:{clip or self.clip}", *more)
+
+    def test_frames_wait_for_slow_drawing_asleep(self):
+        self.bridge("handover", self.bake_demo())
 
     def test_poses_are_the_players_to_the_last_bit(self):
         out = self.folder / "poses"

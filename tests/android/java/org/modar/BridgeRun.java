@@ -10,8 +10,10 @@ import java.nio.ByteOrder;
 import java.nio.channels.FileChannel;
 import java.nio.file.Files;
 import java.nio.file.Paths;
+import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.List;
+import java.util.concurrent.atomic.AtomicInteger;
 import java.util.concurrent.atomic.AtomicReference;
 import java.util.regex.Matcher;
 import java.util.regex.Pattern;
@@ -37,6 +39,9 @@ public final class BridgeRun {
             case "gyroscope":
                 gyroscope(words[5], words[6]);
                 break;
+            case "handover":
+                handover();
+                break;
             case "pictures":
                 pictures(words[1], words[5]);
                 break;
@@ -58,6 +63,56 @@ public final class BridgeRun {
             default:
                 soak(words[1], Integer.parseInt(words[5]));
         }
+    }
+
+    private static final class CountedFrame extends Frame {
+        final AtomicInteger released = new AtomicInteger();
+
+        CountedFrame() {
+            super(1);
+        }
+
+        @Override
+        int track(long session) {
+            return 0;
+        }
+
+        @Override
+        void draw(long session) {}
+
+        @Override
+        void release() {
+            released.incrementAndGet();
+        }
+    }
+
+    /** While a frame is drawn, who wants it sleeps: a busy or locked thread has another state. */
+    private static void handover() throws Exception {
+        FrameHandover frames = new FrameHandover();
+        CountedFrame early = new CountedFrame(), drawn = new CountedFrame(), late = new CountedFrame();
+        frames.put(early);
+        frames.put(drawn);
+        check(early.released.get() == 1, "a frame that nobody drew");
+        check(frames.take() == drawn, "the newest frame");
+        List<Thread> callers = new ArrayList<>();
+        for (int i = 0; i < 3; i++) {
+            Thread caller = new Thread(frames::drop);
+            callers.add(caller);
+            caller.start();
+            for (int ms = 0; caller.getState() != Thread.State.WAITING && ms < 10_000; ms++) Thread.sleep(1);
+            check(caller.getState() == Thread.State.WAITING, "caller " + i + " is " + caller.getState());
+        }
+        frames.put(late); // the camera waits for nobody
+        check(drawn.released.get() == 0 && late.released.get() == 0, "a frame that is drawn stays");
+        frames.done();
+        for (Thread caller : callers) caller.join(10_000);
+        check(drawn.released.get() == 1 && late.released.get() == 1, "each frame goes back once");
+        check(frames.take() == null, "no frame is left");
+        frames.put(early);
+        frames.done();
+        check(frames.take() == early && early.released.get() == 1, "the next one");
+        frames.done();
+        check(frames.take() == early, "it is shown until a newer one comes");
     }
 
     /**

@@ -4,7 +4,6 @@ import android.opengl.GLES20;
 import android.opengl.GLSurfaceView;
 import java.io.File;
 import java.nio.ByteBuffer;
-import java.util.concurrent.atomic.AtomicReference;
 import javax.microedition.khronos.egl.EGLConfig;
 import javax.microedition.khronos.opengles.GL10;
 
@@ -13,7 +12,7 @@ final class Stage implements GLSurfaceView.Renderer {
     private final GLSurfaceView view;
     private final MainActivity screen;
     private final Diagnostics diagnostics;
-    private final AtomicReference<Frame> next = new AtomicReference<>();
+    private final FrameHandover frames = new FrameHandover();
     /** Behind models without the camera: a light gray, on which black and white ones have an outline. */
     private static final float GROUND = 0.85f;
     /** Set false by tests: searches in step with the frames, so that results do not depend on time. */
@@ -39,7 +38,6 @@ final class Stage implements GLSurfaceView.Renderer {
     private volatile int sensorDegrees;
 
     // GL's thread alone:
-    private Frame shown;
     private Poses lookedAt;
     private long prepared;
     private int width;
@@ -124,11 +122,8 @@ final class Stage implements GLSurfaceView.Renderer {
     }
 
     /** With the camera stopped and GL paused, or before a new bundle: all frames go back. */
-    synchronized void dropFrames() {
-        Frame waiting = next.getAndSet(null);
-        if (waiting != null) waiting.release();
-        if (shown != null) shown.release();
-        shown = null;
+    void dropFrames() {
+        frames.drop();
     }
 
     // --- The camera's thread ---
@@ -155,8 +150,7 @@ final class Stage implements GLSurfaceView.Renderer {
             screen.failed(error);
             return;
         }
-        Frame late = next.getAndSet(frame);
-        if (late != null) late.release();
+        frames.put(frame);
         view.requestRender();
     }
 
@@ -185,12 +179,16 @@ final class Stage implements GLSurfaceView.Renderer {
     }
 
     @Override
-    public synchronized void onDrawFrame(GL10 gl) {
-        Frame newest = next.getAndSet(null);
-        if (newest != null) {
-            if (shown != null) shown.release();
-            shown = newest;
+    public void onDrawFrame(GL10 gl) {
+        try {
+            draw(frames.take());
+        } finally {
+            frames.done();
         }
+    }
+
+    /** shown: the newest frame, or null. */
+    private void draw(Frame shown) {
         long start = System.nanoTime();
         try {
             prepare();
