@@ -101,7 +101,7 @@ set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "runtime of ModAR: files to develop 
 Static libraries of tracker, renderer and installer, headers in C and C++,
 files for CMake and pkg-config, and an example in C.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "libmodar0 (= ${PROJECT_VERSION}), libegl-dev, libgles-dev, libglm-dev, libexpected-dev, libsodium-dev, libzstd-dev, libmeshoptimizer-dev")
+  "libmodar0 (= ${PROJECT_VERSION}), libegl-dev, libgles-dev, libglm-dev, libexpected-dev, libsodium-dev, libzstd-dev")
 if(MODAR_PYTHON)
   list(APPEND CPACK_COMPONENTS_ALL python)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-modar)

@@ -116,7 +116,7 @@ def sources(room):
     """Files of the room in which faults are planted, without those of rooms within it."""
     for path in sorted((ROOT / room).rglob("*")):
         name = path.relative_to(ROOT).as_posix()
-        if path.suffix in (".cpp", ".js", ".mjs", ".java") and "tests" not in path.parts and (room not in TESTS or room_of(name) == room):
+        if path.suffix in (".cpp", ".js", ".mjs", ".java") and "tests" not in path.relative_to(ROOT).parts and (room not in TESTS or room_of(name) == room):
             yield name
 
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Sources out of Debian's source packages, for what Debian has no binary packages of.
 #   scripts/sources.sh FOLDER PACKAGE...   fetches their archives into FOLDER; existing ones stay
-#   scripts/sources.sh --libraries         libraries of modar::fetch for WebAssembly and Android (libsodium, zstd,
-#                                          meshoptimizer, Draco), unpacked in build/sources (40 MB to fetch, once)
+#   scripts/sources.sh --libraries         libraries of modar::fetch for WebAssembly and Android (libsodium, zstd), unpacked in
+#                                          build/sources (4 MB to fetch, once)
 # Exit code 2 where there is no network.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -44,11 +44,9 @@ if [ "${1:-}" = --libraries ]; then
   mkdir -p "$dir"
   exec 9> "$dir/lock"
   flock 9
-  fetch "$dir" libsodium libzstd meshoptimizer draco
+  fetch "$dir" libsodium libzstd
   unpack "$dir" libsodium src/libsodium
   unpack "$dir" libzstd lib
-  unpack "$dir" meshoptimizer src
-  unpack "$dir" draco src/draco
 elif [ $# -ge 2 ]; then
   fetch "$@"
 else

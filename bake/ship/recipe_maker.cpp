@@ -7,12 +7,10 @@
 #include <zstd.h>
 
 #include "bake/ship/content_pieces.hpp"
-#include "bake/ship/limited_process.hpp"
-#include "bake/ship/mesh_encoder.hpp"
+#include "bake/ship/mesh/mesh_pieces.hpp"
 #include "formats/base/parallel.hpp"
 #include "formats/transport/feature_text.hpp"
 #include "formats/transport/stages.hpp"
-#include "formats/transport/vertex_streams.hpp"
 #include "modar/packed_record.hpp"
 #include "modar/piece.hpp"
 #include "modar/release.hpp"
@@ -24,8 +22,8 @@ namespace {
 /// update downloads them all. Above the four sets of 2000 keypoints.
 constexpr std::uint64_t kMaxPatternPiece = 4u << 20;
 
-/// Bytes: of smaller mesh objects and levels, zstd alone may be smaller.
-constexpr std::size_t kTinyObject = 4096;
+/// The highest level without more memory for the decoder: time of publishing for download bytes.
+constexpr int kZstdLevel = 19;
 
 std::vector<std::byte> zstd(std::span<const std::byte> bytes) {
   std::vector<std::byte> packed(ZSTD_compressBound(bytes.size()));
@@ -47,70 +45,12 @@ std::vector<std::byte> split_halves(std::span<const std::byte> blocks) {
 /// A piece under construction.
 struct Draft {
   PieceRecord record{};
-  std::vector<std::byte> raw;  ///< only where it is not a range of the bundle
   std::vector<std::byte> stored;
   bool blocks = false;  ///< of ETC1
 };
 
-/// The places of the vertices and indices of a chunk that may travel as a mesh object.
-struct ChunkPlace {
-  std::uint64_t vertices = 0;  ///< byte in the bundle
-  std::uint64_t vertex_bytes = 0;
-  std::uint64_t indices = 0;
-  std::uint32_t index_bytes = 0;
-  std::uint16_t index_base = 0;
-  LayoutRecord layout{};  ///< as it travels
-};
-
 std::uint64_t place_in(const BundleView& bundle, std::span<const std::byte> section) {
   return static_cast<std::uint64_t>(section.data() - bundle.bytes().data());
-}
-
-/// A model's layout, with the byte of its occlusion as one more attribute.
-LayoutRecord travelling_layout(const BundleView& bundle, const ModelRecord& model) {
-  LayoutRecord layout = bundle.layouts()[model.layout];
-  const std::uint32_t byte = occlusion_byte(bundle.occlusion(), model.layout);
-  if (byte == kNone || layout.attribute_count == std::size(layout.attributes)) return layout;
-  AttributeRecord& occlusion = layout.attributes[layout.attribute_count++];
-  occlusion.semantic = kTravellingOcclusion;
-  occlusion.type = static_cast<std::uint8_t>(ComponentType::kU8);
-  occlusion.components = 1;
-  occlusion.offset = static_cast<std::uint16_t>(byte);
-  return layout;
-}
-
-std::vector<ChunkPlace> chunk_places(const BundleView& bundle) {
-  std::vector<ChunkPlace> places;
-  for (std::uint32_t g = 0; g < bundle.chunk_groups(); ++g) {
-    const ChunkGroup group = bundle.chunk_group(g);
-    const LayoutRecord layout = travelling_layout(bundle, bundle.models()[group.model]);
-    for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
-      const ChunkRecord& chunk = bundle.chunks()[group.first_chunk + c];
-      const LevelRecord& level = bundle.levels()[chunk.first_level];
-      if (level.index_count == 0) continue;
-      const auto bytes = bundle.indices().subspan(level.index_offset, 2ull * level.index_count);
-      std::vector<std::uint16_t> indices(level.index_count);
-      std::memcpy(indices.data(), bytes.data(), bytes.size());
-      const auto [low, high] = std::minmax_element(indices.begin(), indices.end());
-      ChunkPlace place;
-      place.vertices = place_in(bundle, bundle.vertices()) + level.vertex_offset +
-                       std::uint64_t{*low} * layout.stride;
-      place.vertex_bytes = (std::uint64_t{*high} - *low + 1) * layout.stride;
-      place.indices = place_in(bundle, bytes);
-      place.index_bytes = static_cast<std::uint32_t>(bytes.size());
-      place.index_base = *low;
-      place.layout = layout;
-      places.push_back(place);
-    }
-  }
-  return places;
-}
-
-std::vector<std::uint16_t> local_indices(const BundleView& bundle, const ChunkPlace& place) {
-  std::vector<std::uint16_t> indices(place.index_bytes / 2);
-  std::memcpy(indices.data(), bundle.bytes().data() + place.indices, place.index_bytes);
-  for (std::uint16_t& index : indices) index = static_cast<std::uint16_t>(index - place.index_base);
-  return indices;
 }
 
 /// A range of the bundle that a piece covers.
@@ -142,7 +82,6 @@ class RecipeMaker {
 
   Result<PublishedBundle> make() {
     draft_meshes();
-    draft_levels();
     draft_texts();
     draft_records();
     draft_rest();
@@ -160,92 +99,15 @@ class RecipeMaker {
 
   void cover(std::uint64_t begin, std::uint64_t size) { covered_.push_back({begin, begin + size}); }
 
-  /// A chunk's vertices, then its local indices.
-  [[nodiscard]] std::vector<std::byte> mesh_raw(const ChunkPlace& place) const {
-    const auto vertices = at(place.vertices, place.vertex_bytes);
-    const auto indices = local_indices(bundle_, place);
-    const auto index_bytes = std::as_bytes(std::span(indices));
-    std::vector<std::byte> raw(vertices.begin(), vertices.end());
-    raw.insert(raw.end(), index_bytes.begin(), index_bytes.end());
-    return raw;
-  }
-
   void draft_meshes() {
-    const std::vector<ChunkPlace> places = chunk_places(bundle_);
-    const auto objects = run_limited(places.size(), options_.jobs, {}, [&](std::size_t i) {
-      const ChunkPlace& place = places[i];
-      auto object = encode_mesh_object(at(place.vertices, place.vertex_bytes),
-                                       local_indices(bundle_, place), place.layout);
-      if (object && object->size() < kTinyObject &&
-          zstd(mesh_raw(place)).size() <= object->size()) {
-        object.reset();
-      }
-      return object;
-    });
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      if (!objects[i] || overlaps(places[i])) continue;
+    for (MeshPiece& piece : mesh_pieces(bundle_, options_.jobs)) {
       Draft draft;
-      const ChunkPlace& place = places[i];
-      draft.record.form = static_cast<std::uint8_t>(PieceForm::kMesh);
-      draft.record.offset = place.vertices;
-      draft.record.second_offset = place.indices;
-      draft.record.second_size = place.index_bytes;
-      draft.record.index_base = place.index_base;
-      draft.record.raw_size = static_cast<std::uint32_t>(place.vertex_bytes + place.index_bytes);
-      draft.raw = mesh_raw(place);
-      draft.stored = *objects[i];
-      cover(place.vertices, place.vertex_bytes);
-      cover(place.indices, place.index_bytes);
+      draft.record = piece.record;
+      draft.stored = std::move(piece.stored);
+      cover(draft.record.offset, draft.record.raw_size - draft.record.second_size);
+      cover(draft.record.second_offset, draft.record.second_size);
       drafts_.push_back(std::move(draft));
     }
-  }
-
-  /// Indices of coarser levels, local to the vertices of level 0.
-  void draft_levels() {
-    for (const ChunkRecord& chunk : bundle_.chunks()) {
-      std::uint16_t base = 0xFFFF;
-      for (std::uint32_t l = 0; l < chunk.level_count; ++l) {
-        const LevelRecord& level = bundle_.levels()[chunk.first_level + l];
-        const auto bytes = bundle_.indices().subspan(level.index_offset, 2ull * level.index_count);
-        std::vector<std::uint16_t> indices(level.index_count);
-        std::memcpy(indices.data(), bytes.data(), bytes.size());
-        if (l == 0) {
-          for (const std::uint16_t index : indices) base = std::min(base, index);
-        } else {
-          draft_level(place_in(bundle_, bytes), base, std::move(indices));
-        }
-      }
-    }
-  }
-
-  void draft_level(std::uint64_t offset, std::uint16_t base, std::vector<std::uint16_t> indices) {
-    for (std::uint16_t& index : indices) {
-      if (index < base) return;
-      index = static_cast<std::uint16_t>(index - base);
-    }
-    const auto raw = std::as_bytes(std::span(indices));
-    const auto coded = encode_level(indices);
-    if (!coded || is_covered(offset, raw.size())) return;
-    Draft draft;
-    draft.stored = zstd(*coded);
-    if (draft.stored.size() < kTinyObject && zstd(raw).size() <= draft.stored.size()) return;
-    draft.record.form = static_cast<std::uint8_t>(PieceForm::kLevel);
-    draft.record.offset = offset;
-    draft.record.raw_size = static_cast<std::uint32_t>(raw.size());
-    draft.record.index_base = base;
-    draft.raw.assign(raw.begin(), raw.end());
-    cover(offset, raw.size());
-    drafts_.push_back(std::move(draft));
-  }
-
-  [[nodiscard]] bool is_covered(std::uint64_t begin, std::uint64_t size) const {
-    return std::any_of(covered_.begin(), covered_.end(),
-                       [&](const Covered& c) { return begin < c.end && c.begin < begin + size; });
-  }
-
-  [[nodiscard]] bool overlaps(const ChunkPlace& place) const {
-    return is_covered(place.vertices, place.vertex_bytes) ||
-           is_covered(place.indices, place.index_bytes);
   }
 
   /// Feature texts that can be derived from the mapped features.
@@ -347,33 +209,33 @@ class RecipeMaker {
     }
   }
 
-  [[nodiscard]] std::span<const std::byte> raw_of(const Draft& draft) const {
-    return draft.raw.empty() ? at(draft.record.offset, draft.record.raw_size) : draft.raw;
-  }
-
   /// Chooses the smallest form and fills in hash and sizes.
   void pack(Draft& draft) const {
-    const auto raw = raw_of(draft);
-    draft.record.raw_hash = raw_hash(raw);
-    if (draft.record.form == 0) {
-      draft.stored = zstd(raw);
-      draft.record.form = static_cast<std::uint8_t>(PieceForm::kZstd);
-      if (draft.blocks && raw.size() % 8 == 0) {
-        auto halves = zstd(split_halves(raw));
-        if (halves.size() < draft.stored.size()) {
-          draft.stored = std::move(halves);
-          draft.record.form = static_cast<std::uint8_t>(PieceForm::kZstdHalves);
-        }
-      }
-      if (draft.stored.size() >= raw.size()) {
-        draft.stored.assign(raw.begin(), raw.end());
-        draft.record.form = static_cast<std::uint8_t>(PieceForm::kStored);
-      }
+    if (draft.record.raw_hash == 0) {
+      draft.record.raw_hash = raw_hash(at(draft.record.offset, draft.record.raw_size));
     }
+    if (draft.record.form == 0) pack_bytes(draft);
     draft.record.stored_size = static_cast<std::uint32_t>(draft.stored.size());
     if (draft.stored.empty()) return;
     const ObjectId id = object_id(draft.stored);
     std::copy(id.begin(), id.end(), draft.record.id);
+  }
+
+  void pack_bytes(Draft& draft) const {
+    const auto raw = at(draft.record.offset, draft.record.raw_size);
+    draft.stored = zstd(raw);
+    draft.record.form = static_cast<std::uint8_t>(PieceForm::kZstd);
+    if (draft.blocks && raw.size() % 8 == 0) {
+      auto halves = zstd(split_halves(raw));
+      if (halves.size() < draft.stored.size()) {
+        draft.stored = std::move(halves);
+        draft.record.form = static_cast<std::uint8_t>(PieceForm::kZstdHalves);
+      }
+    }
+    if (draft.stored.size() >= raw.size()) {
+      draft.stored.assign(raw.begin(), raw.end());
+      draft.record.form = static_cast<std::uint8_t>(PieceForm::kStored);
+    }
   }
 
   Result<PublishedBundle> finish() {
@@ -395,7 +257,7 @@ class RecipeMaker {
                     "byte " + std::to_string(draft.record.offset),
                     "a piece does not decode to its original bytes", "report this as a bug");
       }
-      draft.record.stage = static_cast<std::uint8_t>(stage_of(draft.record));
+      draft.record.stage = static_cast<std::uint8_t>(earliest_stage(draft.record, stages_));
       pieces.push_back(draft.record);
       FormTotals& totals = out.forms[form];
       ++totals.pieces;
@@ -411,23 +273,6 @@ class RecipeMaker {
     out.download_size = out.recipe_object.size();
     for (const auto& [id, object] : out.objects) out.download_size += object.size();
     return out;
-  }
-
-  /// The earliest that some of the piece's bytes are needed for.
-  [[nodiscard]] LoadStage stage_of(const PieceRecord& piece) const {
-    LoadStage stage = LoadStage::kRefine;
-    const auto meets = [](const StageRange& range, std::uint64_t offset, std::uint64_t size) {
-      return offset < range.offset + range.size && range.offset < offset + size;
-    };
-    const bool mesh = static_cast<PieceForm>(piece.form) == PieceForm::kMesh;
-    const std::uint64_t second = mesh ? piece.second_size : 0;
-    for (const StageRange& range : stages_) {
-      if (meets(range, piece.offset, piece.raw_size - second) ||
-          (mesh && meets(range, piece.second_offset, second))) {
-        stage = std::min(stage, range.stage);
-      }
-    }
-    return stage;
   }
 
   const BundleView& bundle_;

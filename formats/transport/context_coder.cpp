@@ -57,32 +57,7 @@ ContextCoder::ContextCoder(std::size_t weight_sets)
 
 ContextCoder::ContextCoder(std::size_t weight_sets, std::span<const std::byte> coded)
     : ContextCoder(weight_sets) {
-  decodes_ = true;
-  coded_ = coded;
-  for (int i = 0; i < 4; ++i) value_ = value_ << 8 | next_byte();
-}
-
-std::uint32_t ContextCoder::next_byte() {
-  const std::size_t at = read_++;
-  return at < coded_.size() ? std::to_integer<std::uint32_t>(coded_[at]) : 0;
-}
-
-/// One decision by its probability: the range's lower part where it holds.
-bool ContextCoder::split(bool decision, std::uint32_t probability) {
-  const auto part = (std::uint64_t{high_ - low_} * probability) >> 16;
-  const std::uint32_t middle = low_ + static_cast<std::uint32_t>(part);
-  if (decodes_) decision = value_ <= middle;
-  (decision ? high_ : low_) = decision ? middle : middle + 1;
-  while (((low_ ^ high_) & 0xFF000000u) == 0) {
-    if (decodes_) {
-      value_ = value_ << 8 | next_byte();
-    } else {
-      out_.push_back(static_cast<std::byte>(high_ >> 24));
-    }
-    low_ <<= 8;
-    high_ = high_ << 8 | 0xFF;
-  }
-  return decision;
+  range_ = RangeCoder(coded);
 }
 
 void ContextCoder::learn(Mix& mix, bool decision) const {
@@ -107,8 +82,8 @@ bool ContextCoder::code(bool decision, std::uint32_t node, std::size_t first, st
   }
   for (std::size_t m = 0; m < 2; ++m) mixes[m].probability = table.squashed(sums[m] >> 16);
   const int mixed = table.squashed((sums[0] + sums[1]) >> 17);
-  decision = split(decision, static_cast<std::uint32_t>(
-                                 std::clamp(mixed, kMinProbability, 65536 - kMinProbability)));
+  decision = range_.code(decision, static_cast<std::uint32_t>(std::clamp(mixed, kMinProbability,
+                                                                         65536 - kMinProbability)));
   for (Mix& mix : mixes) learn(mix, decision);
   for (std::uint32_t* slot : hits_) {
     const std::uint32_t count = *slot & 1023;
@@ -118,11 +93,6 @@ bool ContextCoder::code(bool decision, std::uint32_t node, std::size_t first, st
     *slot = moved << 10 | std::min(count + 1, kMostCount);
   }
   return decision;
-}
-
-std::vector<std::byte> ContextCoder::finish() {
-  for (int i = 0; i < 4; ++i, low_ <<= 8) out_.push_back(static_cast<std::byte>(low_ >> 24));
-  return std::move(out_);
 }
 
 }  // namespace modar

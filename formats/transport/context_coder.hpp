@@ -9,6 +9,8 @@
 #include <span>
 #include <vector>
 
+#include "formats/transport/range_coder.hpp"
+
 namespace modar {
 
 /// Encodes decisions, or decodes them: a model that calls code() with the same contexts serves both
@@ -28,13 +30,12 @@ class ContextCoder {
   /// symbol this is. first, second: two different sets of weights, chosen by what little tells.
   bool code(bool decision, std::uint32_t node, std::size_t first, std::size_t second);
 
-  [[nodiscard]] bool decodes() const { return decodes_; }
   /// Coded bytes that decisions so far depend on.
-  [[nodiscard]] std::size_t read() const { return read_; }
+  [[nodiscard]] std::size_t read() const { return range_.read(); }
   /// More was decoded than the bytes hold.
-  [[nodiscard]] bool overrun() const { return read_ > coded_.size() + 4; }
+  [[nodiscard]] bool overrun() const { return range_.overrun(); }
   /// The encoded bytes; nothing may be coded after.
-  std::vector<std::byte> finish();
+  std::vector<std::byte> finish() { return range_.finish(); }
 
  private:
   static constexpr unsigned kTableBits = 16;
@@ -44,17 +45,9 @@ class ContextCoder {
     int probability;  ///< of a decision that holds, of 65536
   };
   static const Tables& tables();
-  std::uint32_t next_byte();
-  bool split(bool decision, std::uint32_t probability);
   void learn(Mix& mix, bool decision) const;
 
-  bool decodes_ = false;
-  std::span<const std::byte> coded_;
-  std::size_t read_ = 0;
-  std::vector<std::byte> out_;
-  std::uint32_t low_ = 0;
-  std::uint32_t high_ = 0xFFFFFFFFu;
-  std::uint32_t value_ = 0;
+  RangeCoder range_;
   std::vector<std::uint32_t> slots_;   ///< a probability of 22 bits, then a count of 10
   std::vector<std::int32_t> weights_;  ///< 65536: one
   std::array<std::uint32_t, kContexts> contexts_{};

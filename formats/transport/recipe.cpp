@@ -66,6 +66,19 @@ const char* fault_of(const PieceRecord& piece, std::uint64_t bundle_size, std::u
   return fits(piece.offset, first, bundle_size) ? nullptr : "it leaves the bundle";
 }
 
+/// Adds to each of the piece's indices, modulo 65536: they are local to a chunk.
+void shift_indices(const PieceRecord& piece, std::span<std::byte> raw, std::uint32_t base) {
+  const auto form = static_cast<PieceForm>(piece.form);
+  if (form != PieceForm::kMesh && form != PieceForm::kLevel) return;
+  const auto indices = form == PieceForm::kLevel ? raw : parts_of(piece, raw).second;
+  for (std::size_t i = 0; i + 1 < indices.size(); i += 2) {
+    std::uint16_t index = 0;
+    std::memcpy(&index, indices.data() + i, sizeof index);
+    index = static_cast<std::uint16_t>(index + base);
+    std::memcpy(indices.data() + i, &index, sizeof index);
+  }
+}
+
 /// recipe: a header at least.
 std::uint64_t table_hash(std::span<const std::byte> recipe) {
   RecipeHeader header{};
@@ -77,6 +90,20 @@ std::uint64_t table_hash(std::span<const std::byte> recipe) {
 }
 
 }  // namespace
+
+PieceParts parts_of(const PieceRecord& piece, std::span<std::byte> raw) {
+  const bool mesh = static_cast<PieceForm>(piece.form) == PieceForm::kMesh;
+  const std::size_t second = mesh ? std::min<std::size_t>(piece.second_size, raw.size()) : 0;
+  return {raw.first(raw.size() - second), raw.last(second)};
+}
+
+void add_index_base(const PieceRecord& piece, std::span<std::byte> raw) {
+  shift_indices(piece, raw, piece.index_base);
+}
+
+void subtract_index_base(const PieceRecord& piece, std::span<std::byte> raw) {
+  shift_indices(piece, raw, 0x10000u - piece.index_base);
+}
 
 std::vector<std::byte> recipe_bytes(RecipeHeader header, std::span<const PieceRecord> pieces) {
   std::copy(kRecipeMagic.begin(), kRecipeMagic.end(), header.magic);

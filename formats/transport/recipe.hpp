@@ -28,9 +28,9 @@ enum class PieceForm : std::uint8_t {
   kStored = 1,      ///< the raw bytes
   kZstd = 2,        ///< a zstd frame of them
   kZstdHalves = 3,  ///< ETC1: a zstd frame of the blocks' first four bytes, then of their last four
-  kMesh = 4,        ///< a mesh object (modar/piece.hpp)
+  kMesh = 4,        ///< a mesh object (mesh_coder.hpp)
   kFeatureText = 5,    ///< nothing stored: the text of the mapped features at second_offset
-  kLevel = 6,          ///< a coarser level's indices: zstd of meshoptimizer's index codec
+  kLevel = 6,          ///< a coarser level's indices (mesh_coder.hpp)
   kTrackerRecord = 7,  ///< since version 2: a packed tracker record (modar/packed_record.hpp)
   kCoded = 8,          ///< since version 2: bytes by encode_bytes(), index_base as their stride
 };
@@ -83,6 +83,16 @@ std::vector<std::byte> recipe_bytes(RecipeHeader header, std::span<const PieceRe
 
 /// bytes: 8-byte aligned. Errors: kInvalidInput "recipe.*".
 Result<RecipeView> open_recipe(std::span<const std::byte> bytes);
+
+/// The raw bytes of a piece by where they go.
+struct PieceParts {
+  std::span<std::byte> first;   ///< to `offset`
+  std::span<std::byte> second;  ///< to `second_offset`; empty but for kMesh
+};
+PieceParts parts_of(const PieceRecord& piece, std::span<std::byte> raw);
+/// Adds index_base to the indices of kMesh and kLevel, or takes it off.
+void add_index_base(const PieceRecord& piece, std::span<std::byte> raw);
+void subtract_index_base(const PieceRecord& piece, std::span<std::byte> raw);
 
 /// XXH64, seed 0.
 std::uint64_t raw_hash(std::span<const std::byte> bytes);

@@ -153,6 +153,22 @@ std::vector<StageRange> stage_ranges(const BundleView& bundle) {
   return Planner(bundle).plan();
 }
 
+LoadStage earliest_stage(const PieceRecord& piece, std::span<const StageRange> stages) {
+  const auto meets = [](const StageRange& range, std::uint64_t offset, std::uint64_t size) {
+    return offset < range.offset + range.size && range.offset < offset + size;
+  };
+  const bool mesh = static_cast<PieceForm>(piece.form) == PieceForm::kMesh;
+  const std::uint64_t second = mesh ? piece.second_size : 0;
+  LoadStage stage = LoadStage::kRefine;
+  for (const StageRange& range : stages) {
+    if (meets(range, piece.offset, piece.raw_size - second) ||
+        (mesh && meets(range, piece.second_offset, second))) {
+      stage = std::min(stage, range.stage);
+    }
+  }
+  return stage;
+}
+
 std::uint64_t gpu_start(const BundleView& bundle) {
   std::uint64_t start = bundle.bytes().size();
   for (const SectionEntry& entry : bundle.sections()) {

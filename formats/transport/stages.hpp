@@ -33,6 +33,9 @@ struct StageRange {
 /// All of a bundle but the zeros between sections, in the order of need. It reads tables only.
 std::vector<StageRange> stage_ranges(const BundleView& bundle);
 
+/// The earliest stage that some of a piece's bytes are of.
+LoadStage earliest_stage(const PieceRecord& piece, std::span<const StageRange> stages);
+
 /// Where a bundle's vertices, indices and texture blocks begin: all else is before.
 std::uint64_t gpu_start(const BundleView& bundle);
 

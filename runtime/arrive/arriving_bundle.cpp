@@ -7,6 +7,7 @@
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
 #include "formats/transport/coded_bytes.hpp"
+#include "formats/transport/mesh_coder.hpp"
 #include "formats/transport/stages.hpp"
 
 #ifdef __EMSCRIPTEN__
@@ -32,6 +33,17 @@ Result<std::vector<std::byte>> own_bytes(const PieceRecord& piece,
       if (raw) return *std::move(raw);
       return fail(ExitCode::kInvalidInput, "piece.coded", "piece", "it ends too early", kCure);
     }
+    case PieceForm::kMesh: {
+      MODAR_ASSIGN(auto mesh, decode_mesh(stored));
+      const auto indices = std::as_bytes(std::span(mesh.indices));
+      mesh.vertices.insert(mesh.vertices.end(), indices.begin(), indices.end());
+      return std::move(mesh.vertices);
+    }
+    case PieceForm::kLevel: {
+      MODAR_ASSIGN(const auto indices, decode_level(stored, piece.raw_size / 2));
+      const auto bytes = std::as_bytes(std::span(indices));
+      return std::vector<std::byte>(bytes.begin(), bytes.end());
+    }
     default:
       return fail(ExitCode::kUnsupported, "piece.form", "piece", "its form needs a library",
                   "use modar-fetch");
@@ -39,8 +51,8 @@ Result<std::vector<std::byte>> own_bytes(const PieceRecord& piece,
 }
 
 bool needs_no_library(PieceForm form) {
-  return form == PieceForm::kStored || form == PieceForm::kTrackerRecord ||
-         form == PieceForm::kCoded;
+  return form == PieceForm::kStored || form == PieceForm::kMesh || form == PieceForm::kLevel ||
+         form == PieceForm::kTrackerRecord || form == PieceForm::kCoded;
 }
 
 /// Zeros; untouched where they are zeros already, so that pages without pieces take no memory.
@@ -120,6 +132,12 @@ bool ArrivingBundle::put(std::uint64_t offset, std::span<const std::byte> raw) {
   if (offset > size_ || raw.size() > size_ - offset) return false;
   if (!raw.empty()) std::memcpy(bytes_.get() + offset, raw.data(), raw.size());
   return true;
+}
+
+bool ArrivingBundle::put_piece(const PieceRecord& piece, std::span<std::byte> raw) {
+  add_index_base(piece, raw);
+  const PieceParts parts = parts_of(piece, raw);
+  return put(piece.offset, parts.first) && put(piece.second_offset, parts.second);
 }
 
 Result<void> ArrivingBundle::show_coarsest() {

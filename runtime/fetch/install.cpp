@@ -30,16 +30,6 @@ Result<RecipeView> unpack_recipe(std::span<const std::byte> stored, std::size_t 
   return open_recipe(std::as_bytes(std::span(bytes)).first(raw.size()));
 }
 
-/// Adds `base` to each 16-bit index, modulo 65536: indices of a piece are local to its chunk.
-void shift_indices(std::span<std::byte> indices, std::uint16_t base) {
-  for (std::size_t i = 0; i + 1 < indices.size(); i += 2) {
-    std::uint16_t index = 0;
-    std::memcpy(&index, indices.data() + i, 2);
-    index = static_cast<std::uint16_t>(index + base);
-    std::memcpy(indices.data() + i, &index, 2);
-  }
-}
-
 /// An installed bundle with its recipe.
 struct OldBundle {
   MappedFile bundle;
@@ -91,9 +81,7 @@ std::optional<std::vector<std::byte>> PieceSource::raw(const ObjectId& id) const
       bytes.subspan(static_cast<std::size_t>(piece->second_offset), piece->second_size);
   std::vector<std::byte> raw(first.begin(), first.end());
   raw.insert(raw.end(), second.begin(), second.end());
-  const bool level = static_cast<PieceForm>(piece->form) == PieceForm::kLevel;
-  shift_indices(std::span(raw).subspan(level ? 0 : first.size()),
-                static_cast<std::uint16_t>(-piece->index_base));
+  subtract_index_base(*piece, raw);
   if (raw_hash(raw) != piece->raw_hash) return std::nullopt;
   return raw;
 }
@@ -123,13 +111,11 @@ struct AssemblyCounts {
 };
 
 Result<void> write_raw(OutputFile& file, const PieceRecord& piece, std::span<std::byte> raw) {
-  const auto form = static_cast<PieceForm>(piece.form);
-  const std::size_t second_size = form == PieceForm::kMesh ? piece.second_size : 0;
-  const auto second = raw.last(second_size);
-  shift_indices(form == PieceForm::kLevel ? raw : second, piece.index_base);
-  MODAR_TRY(file.write_at(piece.offset, raw.data(), raw.size() - second_size));
-  if (second.empty()) return {};
-  return file.write_at(piece.second_offset, second.data(), second.size());
+  add_index_base(piece, raw);
+  const PieceParts parts = parts_of(piece, raw);
+  MODAR_TRY(file.write_at(piece.offset, parts.first.data(), parts.first.size()));
+  if (parts.second.empty()) return {};
+  return file.write_at(piece.second_offset, parts.second.data(), parts.second.size());
 }
 
 /// Feature texts are written last, from the mapped features that are in the file by then.

@@ -42,23 +42,3 @@ file(GLOB zstd_files ${zstd}/common/*.c ${zstd}/decompress/*.c)
 modar_source_library(source_zstd PkgConfig::ZSTD ${zstd_files})
 target_include_directories(source_zstd SYSTEM PUBLIC ${zstd})
 target_compile_definitions(source_zstd PRIVATE ZSTD_DISABLE_ASM=1 ZSTD_LEGACY_SUPPORT=0)
-
-modar_source_library(source_meshoptimizer meshoptimizer::meshoptimizer
-  ${source_root}/meshoptimizer/src/allocator.cpp ${source_root}/meshoptimizer/src/indexcodec.cpp)
-target_include_directories(source_meshoptimizer SYSTEM PUBLIC ${source_root}/meshoptimizer/src)
-
-set(draco ${source_root}/draco/src)
-file(GLOB_RECURSE draco_files ${draco}/draco/attributes/*.cc ${draco}/draco/compression/*.cc ${draco}/draco/core/*.cc
-  ${draco}/draco/mesh/*.cc ${draco}/draco/metadata/*.cc ${draco}/draco/point_cloud/*.cc)
-# Of the decoder of meshes nothing is left out; trees of points are most of what the rest takes to compile.
-list(FILTER draco_files EXCLUDE REGEX "test|encod|expert|equality_checker|stripifier|kd_tree|points_tree|point_cloud_sequential|\
-shannon|cycle_timer|builder|are_equivalent|connected_components|property_table|structural_metadata|\
-/mesh_[a-z_]*(cleanup|splitter|features|utils|misc_functions)")
-modar_source_library(source_draco draco::draco_static ${draco_files})
-file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/draco/draco/draco_features.h "#pragma once
-#define DRACO_MESH_COMPRESSION_SUPPORTED
-#define DRACO_NORMAL_ENCODING_SUPPORTED
-#define DRACO_STANDARD_EDGEBREAKER_SUPPORTED
-#define DRACO_PREDICTIVE_EDGEBREAKER_SUPPORTED
-")
-target_include_directories(source_draco SYSTEM PUBLIC ${CMAKE_CURRENT_BINARY_DIR}/draco ${draco})

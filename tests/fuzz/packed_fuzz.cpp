@@ -20,10 +20,10 @@ using test::need;
 constexpr std::uint64_t kMostBytes = 4 << 20;
 
 void place(ArrivingBundle& bundle, const PieceRecord& piece, std::span<const std::byte> stored) {
-  const auto raw = decode_own_piece(piece, stored);
+  auto raw = decode_own_piece(piece, stored);
   if (!raw) return test::need_told(raw.error());
   need(raw->size() == piece.raw_size);
-  need(bundle.put(piece.offset, *raw));
+  need(bundle.put_piece(piece, *raw));
 }
 
 void read_packed(std::span<const std::byte> bytes) {

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "formats/transport/mesh_coder.hpp"
 #include "modar/piece.hpp"
 #include "tests/fuzz/need.hpp"
 
@@ -36,7 +37,7 @@ void read_piece(std::span<const std::byte> stored, PieceForm form, std::uint32_t
 }
 
 void read_mesh(std::span<const std::byte> object) {
-  const auto mesh = decode_mesh_object(object);
+  const auto mesh = decode_mesh(object);
   if (!mesh) return test::need_told(mesh.error());
   need(mesh->indices.size() % 3 == 0);
 }

@@ -248,9 +248,9 @@ std::unique_ptr<ArrivingBundle> arrived(const Bytes& packed, LoadStage until) {
     const auto stored = std::span(packed).subspan(at, piece.stored_size);
     at += piece.stored_size;
     if (static_cast<LoadStage>(piece.stage) > until) continue;
-    const auto raw = decode_own_piece(piece, stored);
+    auto raw = decode_own_piece(piece, stored);
     EXPECT_TRUE(raw);
-    EXPECT_TRUE(bundle->put(piece.offset, *raw));
+    EXPECT_TRUE(bundle->put_piece(piece, *raw));
   }
   EXPECT_EQ(at, packed.size());
   return bundle;
@@ -262,14 +262,14 @@ Bytes copy(ArrivingBundle& bundle) {
 
 TEST(Arriving, AllPiecesMakeTheBundle) {
   const Bytes bytes = staged_bundle();
-  const Bytes packed = pack_bundle(BundleView::open(bytes).value());
-  EXPECT_EQ(pack_bundle(BundleView::open(bytes).value()), packed);
+  const Bytes packed = pack_bundle(BundleView::open(bytes).value(), 1);
+  EXPECT_EQ(pack_bundle(BundleView::open(bytes).value(), 3), packed);
   EXPECT_EQ(copy(*arrived(packed, LoadStage::kRefine)), bytes);
 }
 
 TEST(Arriving, TheFirstStageOpensAndHasTheRecord) {
   const Bytes bytes = staged_bundle();
-  const auto first = arrived(pack_bundle(BundleView::open(bytes).value()), LoadStage::kFind);
+  const auto first = arrived(pack_bundle(BundleView::open(bytes).value(), 1), LoadStage::kFind);
   const auto bundle = BundleView::open(first->bytes());
   ASSERT_TRUE(bundle) << bundle.error().cause;
   const auto record = bundle->section(SectionType::kTrackerRecord, 0);
@@ -281,7 +281,7 @@ TEST(Arriving, TheFirstStageOpensAndHasTheRecord) {
 TEST(Arriving, WhatIsShownFirstIsThere) {
   const Bytes bytes = staged_bundle();
   const auto whole = BundleView::open(bytes).value();
-  const auto some = arrived(pack_bundle(whole), LoadStage::kShow);
+  const auto some = arrived(pack_bundle(whole, 2), LoadStage::kShow);
   const Bytes before = copy(*some);
   const auto bundle = BundleView::open(some->bytes());
   ASSERT_TRUE(bundle) << bundle.error().cause;
@@ -369,7 +369,7 @@ TEST(Arriving, OfWhatPassesByIsKeptWhatIsRead) {
 
 TEST(Arriving, OtherFilesAndOrdersAreRefused) {
   const Bytes bytes = staged_bundle();
-  const Bytes packed = pack_bundle(BundleView::open(bytes).value());
+  const Bytes packed = pack_bundle(BundleView::open(bytes).value(), 1);
   EXPECT_FALSE(packed_recipe_size(bytes)) << "a bundle";
   EXPECT_FALSE(packed_recipe_size(std::span(packed).first(63)));
   const std::size_t size = packed_recipe_size(packed).value();

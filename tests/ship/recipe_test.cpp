@@ -47,7 +47,7 @@ TEST(Recipe, PiecesMakeTheBundle) {
     const bool mesh = piece.form == static_cast<std::uint8_t>(PieceForm::kMesh);
     const std::size_t second = mesh ? piece.second_size : 0;
     std::memcpy(built.data() + piece.offset, raw->data(), raw->size() - second);
-    ASSERT_NE(piece.form, static_cast<std::uint8_t>(PieceForm::kLevel)) << "tiny: cheaper raw";
+    ASSERT_NE(piece.form, static_cast<std::uint8_t>(PieceForm::kLevel)) << "too small for one";
     for (std::size_t i = 0; i < second; i += 2) {
       std::uint16_t index = 0;
       std::memcpy(&index, raw->data() + raw->size() - second + i, 2);

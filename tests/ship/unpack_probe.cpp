@@ -20,8 +20,8 @@ Result<std::uint64_t> unpacked_hash(std::span<const std::byte> file) {
   std::size_t at = size;
   for (const PieceRecord& piece : recipe.pieces) {
     if (piece.stored_size > file.size() - at) break;  // verify_sections() tells
-    MODAR_ASSIGN(const auto raw, decode_own_piece(piece, file.subspan(at, piece.stored_size)));
-    bundle->put(piece.offset, raw);
+    MODAR_ASSIGN(auto raw, decode_own_piece(piece, file.subspan(at, piece.stored_size)));
+    bundle->put_piece(piece, raw);
     at += piece.stored_size;
   }
   MODAR_ASSIGN(const BundleView view, BundleView::open(bundle->bytes()));

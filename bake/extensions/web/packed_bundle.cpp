@@ -1,9 +1,12 @@
 #include "bake/extensions/web/packed_bundle.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <map>
 #include <span>
 #include <utility>
 
+#include "bake/ship/mesh/mesh_pieces.hpp"
 #include "formats/transport/coded_bytes.hpp"
 #include "formats/transport/recipe.hpp"
 #include "formats/transport/stages.hpp"
@@ -22,7 +25,7 @@ constexpr std::uint64_t kMostRaw = 256 << 10;
 constexpr std::uint64_t kMostCoded = 4 << 20;
 
 /// Bytes at least of a piece that ends with a level's vertices or indices. Smaller pieces enlarge
-/// the recipe. Not measured.
+/// the recipe.
 constexpr std::uint64_t kLeastCut = 8 << 10;
 
 struct Piece {
@@ -32,12 +35,19 @@ struct Piece {
 
 class Packer {
  public:
-  explicit Packer(const BundleView& bundle) : bundle_(bundle) { find_level_ends(); }
+  Packer(const BundleView& bundle, unsigned jobs) : bundle_(bundle), jobs_(jobs) {
+    find_level_ends();
+  }
 
   std::vector<std::byte> pack() {
-    for (const StageRange& range : stage_ranges(bundle_)) {
-      if (!add_record(range)) add_bytes(range);
+    const std::vector<StageRange> stages = stage_ranges(bundle_);
+    add_meshes(stages);
+    for (const StageRange& range : stages) {
+      if (!add_record(range)) add_rest(range);
     }
+    std::stable_sort(pieces_.begin(), pieces_.end(), [](const Piece& a, const Piece& b) {
+      return a.record.stage < b.record.stage;
+    });
     RecipeHeader header{};
     header.bundle_size = bundle_.bytes().size();
     const BundleHash hash = bundle_hash(bundle_.bytes());
@@ -68,6 +78,41 @@ class Packer {
     }
     piece.stored = std::move(stored);
     pieces_.push_back(std::move(piece));
+  }
+
+  /// Chunks and levels; not those of which a page loads parts.
+  void add_meshes(std::span<const StageRange> stages) {
+    const bool whole = bundle_.bytes().size() <= kMostWhole;
+    for (MeshPiece& mesh : mesh_pieces(bundle_, jobs_)) {
+      PieceRecord& record = mesh.record;
+      record.stage = static_cast<std::uint8_t>(earliest_stage(record, stages));
+      if (!whole && record.stage == static_cast<std::uint8_t>(LoadStage::kRefine)) continue;
+      const ObjectId id = object_id(mesh.stored);
+      std::copy(id.begin(), id.end(), record.id);
+      record.stored_size = static_cast<std::uint32_t>(mesh.stored.size());
+      covered_[record.offset] = record.offset + record.raw_size - record.second_size;
+      if (record.second_size > 0) {
+        covered_[record.second_offset] = record.second_offset + record.second_size;
+      }
+      pieces_.push_back({record, std::move(mesh.stored)});
+    }
+  }
+
+  /// Bytes that no mesh covers.
+  void add_rest(StageRange range) {
+    const std::uint64_t end = range.offset + range.size;
+    auto next = covered_.upper_bound(range.offset);
+    if (next != covered_.begin() && std::prev(next)->second > range.offset) --next;
+    for (; range.offset < end; ++next) {
+      const bool last = next == covered_.end() || next->first >= end;
+      const std::uint64_t begin = last ? end : next->first;
+      if (begin > range.offset) {
+        range.size = begin - range.offset;
+        add_bytes(range);
+      }
+      if (last) return;
+      range.offset = next->second;
+    }
   }
 
   /// A whole tracker record, packed.
@@ -131,6 +176,8 @@ class Packer {
   }
 
   const BundleView& bundle_;
+  const unsigned jobs_;
+  std::map<std::uint64_t, std::uint64_t> covered_;  ///< by meshes: begin, end
   std::vector<std::uint64_t> ends_;  ///< of levels' vertices and indices, in the file
   std::vector<Piece> pieces_;
   std::uint64_t coded_ = 0;
@@ -138,8 +185,8 @@ class Packer {
 
 }  // namespace
 
-std::vector<std::byte> pack_bundle(const BundleView& bundle) {
-  return Packer(bundle).pack();
+std::vector<std::byte> pack_bundle(const BundleView& bundle, unsigned jobs) {
+  return Packer(bundle, jobs).pack();
 }
 
 std::size_t shown_bytes(std::span<const std::byte> packed) {

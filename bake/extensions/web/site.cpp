@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <span>
 #include <string_view>
+#include <thread>
 
 #include "bake/export/model_file.hpp"
 #include "bake/export/room_models.hpp"
@@ -269,9 +270,6 @@ Result<void> put_room(Draft& draft, const BundleView& bundle, std::uint32_t patt
   return {};
 }
 
-// Bytes of a bundle up to which a page downloads it whole: MOST_BYTES of modar-view.js.
-constexpr std::size_t kMostWhole = std::size_t{64} << 20;
-
 /// The bundle, for other pages, and packed, as this page loads it; answers the address that
 /// it loads. A page that is written again after each bake stays with the bundle, which packing
 /// would make it wait for. stem: of the files' names.
@@ -285,7 +283,7 @@ Result<std::string> put_bytes(Draft& draft, const std::string& stem,
   }
   MODAR_TRY(put_online(draft, raw, bytes));
   MODAR_ASSIGN(const BundleView bundle, BundleView::open(bytes));
-  const std::vector<std::byte> packed = pack_bundle(bundle);
+  const std::vector<std::byte> packed = pack_bundle(bundle, std::thread::hardware_concurrency());
   draft.site.packed_bytes += packed.size();
   // The page asks for what shows something first, where the host has ranges.
   const std::string query = version + "&first=" + std::to_string(shown_bytes(packed));

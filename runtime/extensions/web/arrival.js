@@ -35,13 +35,26 @@ export const STAGE = {
 /**
  * @typedef {{ offset: number, bytes: Uint8Array }} Part of a bundle
  * @typedef {(offset: number, bytes: Uint8Array) => void} Take
- * @typedef {{ index: number, at: number, stored: number, offset: number, size: number, form:
- * number, stage: number }} Piece
+ * @typedef {{ offset: number, size: number, second?: number, secondSize?: number }} Place
+ * @typedef {Place & { index: number, at: number, stored: number, form: number, stage: number }}
+ * Piece
  * @typedef {{ ask: (question: object, transfer?: Transferable[]) => Promise<any>, close: () => void
  * }} Decoder
  * @typedef {import('./download.js').Source} Source
  * @typedef {(Arrival | RawArrival) & {inOrder?: boolean, tracked?: Part[] | null}} AnyArrival
  */
+
+/**
+ * Puts the raw bytes of a piece in their places: those of a mesh have two.
+ * @param {Place} piece
+ * @param {Uint8Array} raw
+ * @param {Take} take
+ */
+export function place({offset, second, secondSize = 0}, raw, take) {
+  const end = raw.length - secondSize;
+  take(offset, raw.subarray(0, end));
+  if (second) take(second, raw.subarray(end));
+}
 
 /** @param {Uint8Array} start */
 export const isPacked = (start) => MAGIC.every((byte, i) => start[i] === byte);
@@ -204,7 +217,9 @@ export class Arrival {
         at,
         stored,
         offset: long(record + 24),
+        second: long(record + 32),
         size: view.getUint32(record + 40, true),
+        secondSize: view.getUint32(record + 48, true),
         form: view.getUint8(record + 54),
         stage: view.getUint8(record + 55),
       });
@@ -236,14 +251,15 @@ export class Arrival {
    * @param {Uint8Array} bytes
    * @param {Take} take
    */
-  async #decode({index, at, stored, offset, size}, bytes, take) {
+  async #decode(piece, bytes, take) {
+    const {index, at, stored, size} = piece;
     let copy = bytes;
     const answer = await this.#tried(
         () => this.#decoder.ask({type: 'piece', index, stored: copy, size}, [copy.buffer]),
         async () => {
           copy = await this.#source.again(at, stored);
         });
-    take(offset, answer.bytes);
+    place(piece, answer.bytes, take);
   }
 
   /**

@@ -227,7 +227,8 @@ EMSCRIPTEN_KEEPALIVE void web_begin_piece(uint32_t index, const void* stored, si
   }
   engine.begun->unpacker.go_on(there);
 }
-/// The raw bytes of a piece of the recipe, until the next one; null for one that is damaged.
+/// The bytes of a piece of the recipe as the bundle has them, until the next one; null for one that
+/// is damaged.
 /// stored: as long as the recipe says.
 EMSCRIPTEN_KEEPALIVE const void* web_piece(uint32_t index, const void* stored) {
   const modar::PieceRecord& piece = engine.recipe.pieces[index];
@@ -238,6 +239,7 @@ EMSCRIPTEN_KEEPALIVE const void* web_piece(uint32_t index, const void* stored) {
     failed(raw.error());
     return nullptr;
   }
+  modar::add_index_base(piece, *raw);
   engine.piece = *std::move(raw);
   return engine.piece.data();
 }

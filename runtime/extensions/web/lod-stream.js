@@ -1,6 +1,7 @@
 // @ts-check
 // Levels of detail of a bundle that is larger than what a view may have: downloaded by
 // ranges when a picture lacks them. Loaded with such.
+import {place} from './arrival.js';
 import {release} from './engine.js';
 
 /**
@@ -28,7 +29,7 @@ const WAIT_S = 1, TRIES = 8;
 const STALL_S = 60;
 
 /**
- * @typedef {{ at: number, stored: number, offset: number, size: number }} Piece
+ * @typedef {import('./arrival.js').Place & { at: number, stored: number }} Piece
  * @typedef {{ pieces: Piece[], first: number, decode: (piece: any, stored: Uint8Array) =>
  * Promise<Uint8Array>, closed: () => boolean, part: (at: number, size: number, options: object) =>
  * Promise<Uint8Array> }} Parts
@@ -179,9 +180,14 @@ export class LodStream {
    * @param {number} size
    */
   #piecesOf(offset, size) {
+    /**
+     * @param {number} at
+     * @param {number} bytes
+     */
+    const meets = (at, bytes) => at < offset + size && offset < at + bytes;
     return this.#parts.pieces.flatMap(
-        (piece, i) =>
-            (piece.offset < offset + size && offset < piece.offset + piece.size ? [i] : []));
+        ({offset: at, size: bytes, second = 0, secondSize = 0}, i) =>
+            (meets(at, bytes - secondSize) || meets(second, secondSize) ? [i] : []));
   }
 
   /**
@@ -238,11 +244,11 @@ export class LodStream {
     const bytes =
         await this.#request(from, last.at + last.stored - from, {tries: 1}).catch(without);
     for (const piece of run) {
-      const {at, stored, offset} = pieces[piece];
+      const {at, stored} = pieces[piece];
       const raw = bytes &&
           await decode(pieces[piece], bytes.slice(at - from, at - from + stored)).catch(without);
       if (closed()) return false;
-      if (raw) this.#have(piece, offset, raw);
+      if (raw) this.#have(piece, raw);
       else this.#comeAgain(piece, wrong);
     }
     if (bytes) release(bytes);
@@ -251,13 +257,12 @@ export class LodStream {
 
   /**
    * @param {number} piece
-   * @param {number} offset
    * @param {Uint8Array} raw
    */
-  #have(piece, offset, raw) {
+  #have(piece, raw) {
     this.#coming.delete(piece);
     this.#tries.delete(piece);
-    this.#take(offset, raw);
+    place(this.#parts.pieces[piece], raw, this.#take);
     release(raw);
     for (const open of [...this.#open]) {  // a bundle opened meanwhile does not have it
       if (!open.pieces.delete(piece) || open.pieces.size > 0) continue;

@@ -17,9 +17,9 @@
 
 namespace modar {
 
-/// Raw bytes of a piece whose form needs no library: kStored, kTrackerRecord, kCoded. Verified.
+/// Raw bytes of a piece whose form needs no library: all but zstd's and kFeatureText. Verified.
 /// begun: of a kTrackerRecord, the part of these bytes that is unpacked already, or null.
-/// Errors: kInvalidInput "piece.*", "record.packed"; kUnsupported "piece.form".
+/// Errors: kInvalidInput "piece.*", "mesh.*", "record.packed"; kUnsupported "piece.form".
 Result<std::vector<std::byte>> decode_own_piece(const PieceRecord& piece,
                                                 std::span<const std::byte> stored,
                                                 RecordUnpacker* begun = nullptr);
@@ -43,6 +43,8 @@ class ArrivingBundle {
   [[nodiscard]] std::span<std::byte> bytes() { return {bytes_.get(), size_}; }
   /// Puts raw bytes in their place; false where they leave the bundle.
   bool put(std::uint64_t offset, std::span<const std::byte> raw);
+  /// The same of what decode_own_piece() answers.
+  bool put_piece(const PieceRecord& piece, std::span<std::byte> raw);
   /// Of the last stage, whose vertices, indices and texture blocks go to the GPU: puts what
   /// kept_ranges() names in its place, and looks at section hashes if bytes come in the file's
   /// order (from gpu_start() on). Errors: kInvalidInput "section.hash".
