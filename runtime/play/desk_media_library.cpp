@@ -31,6 +31,8 @@ namespace modar {
 namespace {
 
 constexpr double kDefaultFps = 30;
+/// Of a still: larger ones are reduced, since the player takes 50 bytes a pixel.
+constexpr double kMostPixels = 12.5e6;
 
 tl::unexpected<Error> damaged(const std::string& path, const std::string& cause) {
   return fail(ExitCode::kInvalidInput, "input.damaged", path, cause,
@@ -54,7 +56,8 @@ void fill(Frame& frame, const cv::Mat& picture) {
 /// A video file or a camera.
 class VideoSource final : public FrameSource {
  public:
-  VideoSource(VideoReader reader, bool live) : reader_(std::move(reader)) {
+  VideoSource(VideoReader reader, std::string name, bool live)
+      : reader_(std::move(reader)), name_(std::move(name)) {
     info_ = {reader_.fps(), reader_.frames(), live, false};
   }
 
@@ -63,6 +66,13 @@ class VideoSource final : public FrameSource {
   Result<bool> next(Frame& frame) override {
     if (stopped_) return false;
     MODAR_ASSIGN(const bool more, reader_.next());
+    // Stated numbers are rounded, and estimates in some formats.
+    if (!more && !info_.live &&
+        static_cast<double>(next_) < 0.9 * static_cast<double>(info_.frames)) {
+      std::fprintf(stderr, "modar-play: %s: it ends after %llu of %llu frames; copy it again\n",
+                   printable(name_).c_str(), static_cast<unsigned long long>(next_),
+                   static_cast<unsigned long long>(info_.frames));
+    }
     if (!more) return false;
     const BgrPicture picture = reader_.picture();
     fill(frame, {picture.height, picture.width, CV_8UC3, const_cast<std::uint8_t*>(picture.pixels),
@@ -77,6 +87,7 @@ class VideoSource final : public FrameSource {
 
  private:
   VideoReader reader_;
+  std::string name_;
   SourceInfo info_;
   std::uint64_t next_ = 0;
   std::atomic<bool> stopped_{false};
@@ -124,27 +135,50 @@ class SceneChange {
   std::array<double, kGrid * kGrid> last_{};
 };
 
-/// While it exists, nothing is printed on stderr, where codecs write by themselves. Other threads
-/// that print there wait.
-class SilentErrors {
+/// While it exists, text for stderr is kept instead: codecs write there by themselves. Other
+/// threads that print there wait.
+class KeptErrors {
  public:
-  SilentErrors() : kept_(dup(STDERR_FILENO)), nowhere_(open("/dev/null", O_WRONLY | O_CLOEXEC)) {
+  KeptErrors() : before_(dup(STDERR_FILENO)), kept_(memfd_create("said", MFD_CLOEXEC)) {
     flockfile(stderr);
-    if (kept_ >= 0 && nowhere_ >= 0) dup2(nowhere_, STDERR_FILENO);
+    if (before_ >= 0 && kept_ >= 0) dup2(kept_, STDERR_FILENO);
   }
-  SilentErrors(const SilentErrors&) = delete;
-  SilentErrors& operator=(const SilentErrors&) = delete;
-  ~SilentErrors() {
-    if (kept_ >= 0 && nowhere_ >= 0) dup2(kept_, STDERR_FILENO);
+  KeptErrors(const KeptErrors&) = delete;
+  KeptErrors& operator=(const KeptErrors&) = delete;
+  ~KeptErrors() {
+    if (before_ >= 0 && kept_ >= 0) dup2(before_, STDERR_FILENO);
     funlockfile(stderr);
+    if (before_ >= 0) close(before_);
     if (kept_ >= 0) close(kept_);
-    if (nowhere_ >= 0) close(nowhere_);
+  }
+  /// The beginning of that text.
+  [[nodiscard]] std::string text() const {
+    std::string said(4096, 0);
+    const ssize_t length = pread(kept_, said.data(), said.size(), 0);
+    said.resize(length < 0 ? 0 : static_cast<std::size_t>(length));
+    return said;
   }
 
  private:
+  int before_;
   int kept_;
-  int nowhere_;
 };
+
+/// Decodes a picture, and says whether pixels of a JPEG are lost: by the same warnings of libjpeg
+/// as bake/image/jpeg.cpp.
+cv::Mat decode(std::span<const std::byte> file, bool& lost) {
+  std::vector<std::uint8_t> bytes(file.size());
+  std::memcpy(bytes.data(), file.data(), file.size());
+  // Where only the end marker is missing, nothing is lost, and where more is, libjpeg says so.
+  if (bytes.front() == 0xFF) bytes.insert(bytes.end(), {0xFF, 0xD9});
+  const KeptErrors kept;
+  cv::Mat picture = cv::imdecode(bytes, cv::IMREAD_COLOR);
+  const std::string said = kept.text();
+  constexpr std::array<std::string_view, 3> kLost = {"premature end of data", "bad Huffman code",
+                                                     "instead of RST"};
+  lost = std::ranges::any_of(kLost, [&](auto words) { return said.find(words) != said.npos; });
+  return picture;
+}
 
 Result<void> read_picture(const std::string& path, Frame& frame) {
   struct stat status {};
@@ -154,9 +188,22 @@ Result<void> read_picture(const std::string& path, Frame& frame) {
   if (!S_ISREG(status.st_mode)) return damaged(path, "it is not a regular file");
   if (status.st_size == 0) return damaged(path, "the file is empty");
   try {
-    const SilentErrors silent;
-    const cv::Mat picture = cv::imread(path, cv::IMREAD_COLOR);
+    MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
+    bool lost = false;
+    cv::Mat picture = decode(file.bytes(), lost);
     if (picture.empty()) return damaged(path, "the picture cannot be decoded");
+    if (lost) {
+      std::fprintf(stderr, "modar-play: %s: a part of the picture is missing; copy it again\n",
+                   printable(path).c_str());
+    }
+    const double scale = std::sqrt(kMostPixels / static_cast<double>(picture.total()));
+    if (scale < 1) {
+      cv::Mat reduced;
+      cv::resize(picture, reduced, {}, scale, scale, cv::INTER_AREA);
+      std::fprintf(stderr, "modar-play: %s: reduced from %dx%d to %dx%d pixels\n",
+                   printable(path).c_str(), picture.cols, picture.rows, reduced.cols, reduced.rows);
+      picture = reduced;
+    }
     fill(frame, picture);
   } catch (const std::exception& error) {
     return damaged(path, std::string("OpenCV: ") + error.what());
@@ -347,7 +394,7 @@ Result<std::unique_ptr<ClipReader>> open_clip(std::span<const std::byte> file,
 
 Result<std::unique_ptr<FrameSource>> open_camera(int number, const std::string& name) {
   MODAR_ASSIGN(VideoReader reader, VideoReader::open_camera(number, name));
-  return std::make_unique<VideoSource>(std::move(reader), true);
+  return std::make_unique<VideoSource>(std::move(reader), name, true);
 }
 
 Result<std::unique_ptr<FrameSource>> open_file(const std::string& path) {
@@ -355,7 +402,7 @@ Result<std::unique_ptr<FrameSource>> open_file(const std::string& path) {
     return std::make_unique<PictureSource>(std::vector<std::string>{path});
   }
   MODAR_ASSIGN(VideoReader reader, VideoReader::open_file(path));
-  return std::make_unique<VideoSource>(std::move(reader), false);
+  return std::make_unique<VideoSource>(std::move(reader), path, false);
 }
 
 Result<std::unique_ptr<FrameSource>> open_path(const std::string& input) {

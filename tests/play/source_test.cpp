@@ -95,6 +95,75 @@ TEST(Source, AFolderWithoutAReadablePictureIsAnError) {
   EXPECT_NE(none.error().cause.find("none of the 2 pictures"), std::string::npos);
 }
 
+/// What reading the picture prints.
+std::string said_of(const std::string& path, Frame& frame) {
+  testing::internal::CaptureStderr();
+  auto source = open_frame_source(path);
+  EXPECT_TRUE(*(*source)->next(frame));
+  return testing::internal::GetCapturedStderr();
+}
+
+TEST(Source, AJpegOfWhichAPartIsMissingIsSaid) {
+  const test::Folder folder;
+  cv::Mat noise(64, 64, CV_8UC3);
+  cv::randu(noise, 0, 255);
+  for (const int progressive : {0, 1}) {
+    cv::imwrite(folder / "a.jpg", noise, {cv::IMWRITE_JPEG_PROGRESSIVE, progressive});
+    const std::string whole = test::read_text(folder / "a.jpg");
+    Frame frame;
+    EXPECT_EQ(said_of(folder / "a.jpg", frame), "");
+    const std::vector<std::uint8_t> pixels = frame.rgb;
+    test::write_text(folder / "b.jpg", whole.substr(0, whole.size() - 2));  // no end marker
+    EXPECT_EQ(said_of(folder / "b.jpg", frame), "");
+    EXPECT_EQ(frame.rgb, pixels);
+    test::write_text(folder / "c.jpg", whole.substr(0, whole.size() * 2 / 3));
+    EXPECT_EQ(said_of(folder / "c.jpg", frame),
+              "modar-play: " + (folder / "c.jpg") +
+                  ": a part of the picture is missing; copy it again\n");
+    EXPECT_EQ(frame.height, 64);
+  }
+}
+
+TEST(Source, AVideoOfWhichAPartIsMissingIsSaid) {
+  const test::Folder folder;
+  const std::string path = folder / "v.avi";
+  {
+    cv::VideoWriter writer(path, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 20, cv::Size(64, 48));
+    cv::Mat noise(48, 64, CV_8UC3);
+    cv::randu(noise, 0, 255);
+    for (int i = 0; i < 20; ++i) writer.write(noise);
+  }
+  const auto play = [&] {
+    testing::internal::CaptureStderr();
+    auto source = open_frame_source(path);
+    Frame frame;
+    while ((*source)->next(frame).value_or(false)) {
+    }
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_EQ(play(), "");
+  const std::string whole = test::read_text(path);
+  test::write_text(path, whole.substr(0, whole.size() / 2));
+  const std::string said = play();
+  EXPECT_NE(said.find("v.avi: it ends after "), said.npos) << said;
+  EXPECT_NE(said.find(" of 20 frames; copy it again\n"), said.npos) << said;
+}
+
+TEST(Source, AHugeStillIsReduced) {
+  const test::Folder folder;
+  cv::Mat halves = flat(6000, 4000, {0, 0, 40});
+  halves.colRange(0, 3000).setTo(cv::Scalar(0, 0, 240));
+  cv::imwrite(folder / "a.png", halves);
+  Frame frame;
+  EXPECT_EQ(said_of(folder / "a.png", frame),
+            "modar-play: " + (folder / "a.png") + ": reduced from 6000x4000 to 4330x2887 pixels\n");
+  ASSERT_EQ(frame.width, 4330);  // the sides keep their ratio: 12.5 million pixels at 3:2
+  ASSERT_EQ(frame.height, 2887);
+  const std::uint8_t* row = &frame.rgb[std::size_t{3} * 4330 * 1000];
+  EXPECT_NEAR(row[3 * 2160], 240, 1);
+  EXPECT_NEAR(row[3 * 2169], 40, 1);
+}
+
 TEST(Source, AVideoGivesEachFrameAtItsTime) {
   const test::Folder folder;
   {
