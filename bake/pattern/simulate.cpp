@@ -113,37 +113,23 @@ class Bands {
   double easy_;
 };
 
-bool works(const SimulatedValue& value) {
-  return value.outcome.right_share() >= kWorks;
-}
-
-/// The longest run of values that work: its first and its last, or two ends.
-std::pair<std::size_t, std::size_t> longest_run(const std::vector<SimulatedValue>& values) {
+/// The longest run of values that work on average and at its last value: its first, and the one
+/// behind its last. most_firsts: values that it may begin with, each of which works then.
+std::pair<std::size_t, std::size_t> longest_run(const std::vector<SimulatedValue>& values,
+                                                std::size_t most_firsts) {
   std::pair<std::size_t, std::size_t> best{0, 0};
-  for (std::size_t first = 0; first < values.size(); ++first) {
-    std::size_t last = first;
-    while (last < values.size() && works(values[last])) ++last;
-    if (last - first > best.second - best.first) best = {first, last};
-    first = last;
-  }
-  return best;
-}
-
-WorkingRange range_of(const std::vector<SimulatedBand>& bands) {
-  WorkingRange range;
-  for (const SimulatedBand& band : bands) {
-    const auto [first, end] = longest_run(band.values);
-    if (end == first) continue;
-    if (band.name == "distance") {
-      range.nearest = band.values[first].value;
-      range.farthest = band.values[end - 1].value;
-    } else if (band.name == "tilt" && first == 0) {
-      range.tilt_deg = band.values[end - 1].value;
-    } else if (band.name == "around" && first == 0) {
-      range.around_deg = band.values[end - 1].value;
+  for (std::size_t first = 0; first < most_firsts; ++first) {
+    double sum = 0;
+    for (std::size_t last = first; last < values.size(); ++last) {
+      const double share = values[last].outcome.right_share();
+      if (last == first && most_firsts > 1 && share < kWorks) break;
+      sum += share;
+      const std::size_t count = last + 1 - first;
+      const bool works = std::min(share, sum / static_cast<double>(count)) >= kWorks;
+      if (works && count > best.second - best.first) best = {first, last + 1};
     }
   }
-  return range;
+  return best;
 }
 
 std::string length_text(double mm) {
@@ -198,6 +184,25 @@ void draw_value(cv::Mat& sheet, const SimulatedValue& value, int x, int y, int h
 }
 
 }  // namespace
+
+WorkingRange range_of(const std::vector<SimulatedBand>& bands) {
+  WorkingRange range;
+  for (const SimulatedBand& band : bands) {
+    const bool distance = band.name == "distance";
+    const auto [first, end] = longest_run(band.values, distance ? band.values.size() : 1);
+    if (end == first) continue;
+    const double last = band.values[end - 1].value;
+    if (distance) {
+      range.nearest = band.values[first].value;
+      range.farthest = last;
+    } else if (band.name == "tilt") {
+      range.tilt_deg = last;
+    } else if (band.name == "around") {
+      range.around_deg = last;
+    }
+  }
+  return range;
+}
 
 Result<Simulation> simulate(const std::string& path, const SimulateOptions& options,
                             const ProgressCallback& progress) {
@@ -257,7 +262,8 @@ std::string range_sentence(const Simulation& simulation) {
   if (simulation.curved) {
     std::snprintf(reach, sizeof reach, "over %.0f degrees around it", 2 * range.around_deg);
   } else {
-    std::snprintf(reach, sizeof reach, "up to %.0f degrees", range.tilt_deg);
+    std::snprintf(reach, sizeof reach,
+                  range.tilt_deg > 0 ? "up to %.0f degrees" : "only without tilt", range.tilt_deg);
   }
   char text[160];
   if (simulation.width_mm > 0) {

@@ -39,7 +39,7 @@ struct SimulatedBand {
   std::vector<SimulatedValue> values;
 };
 
-/// The range in which at least nine of ten frames are right, without a gap. Zeros: none.
+/// The range in which, and at whose ends, at least nine of ten frames are right. Zeros: none.
 struct WorkingRange {
   double nearest = 0;   ///< widths of the pattern
   double farthest = 0;  ///< the same
@@ -59,6 +59,9 @@ struct Simulation {
 /// "simulate.camera" (a camera without a size).
 Result<Simulation> simulate(const std::string& path, const SimulateOptions& options,
                             const ProgressCallback& progress);
+
+/// The longest ranges; tilt and around begin at 0.
+WorkingRange range_of(const std::vector<SimulatedBand>& bands);
 
 /// "printed 20 cm wide, this camera recognises it from 15 cm to 1.6 m and up to 62 degrees".
 std::string range_sentence(const Simulation& simulation);
