@@ -186,12 +186,13 @@ int share_of(double value, double enough) {
   return static_cast<int>(std::clamp(100.0 * value / enough + 0.5, 0.0, 100.0));
 }
 
-/// Mean over blocks of 16x16 pixels of the standard deviation of their gray values.
+/// Mean over blocks of 16x16 pixels of the standard deviation of their gray values, weighted with
+/// itself: empty blocks tell nothing of the ink.
 double contrast_of(const GrayPicture& picture) {
   double sum = 0;
-  int blocks = 0;
-  for (int y = 0; y + 16 <= picture.height; y += 16) {
-    for (int x = 0; x + 16 <= picture.width; x += 16, ++blocks) {
+  double squares = 0;
+  for (int y = 0; y + 16 <= picture.height; y += 8) {
+    for (int x = 0; x + 16 <= picture.width; x += 8) {
       std::int64_t first = 0;
       std::int64_t second = 0;
       for (int k = 0; k < 256; ++k) {
@@ -200,10 +201,12 @@ double contrast_of(const GrayPicture& picture) {
         first += gray;
         second += gray * gray;
       }
-      sum += std::sqrt(static_cast<double>(256 * second - first * first)) / 256;
+      const double variance = static_cast<double>(256 * second - first * first) / (256 * 256);
+      squares += variance;
+      sum += std::sqrt(variance);
     }
   }
-  return blocks > 0 ? sum / blocks : 0;
+  return sum > 0 ? squares / sum : 0;
 }
 
 /// Mean square of the differences of neighbours.

@@ -197,6 +197,18 @@ TEST(Score, NamesWhatIsWrongWithAPicture) {
   }
 }
 
+TEST(Score, BlackOnWhiteHasContrast) {
+  cv::Mat squares(160, 160, CV_8UC1, cv::Scalar(255));
+  Random random(5);
+  for (int i = 0; i < 25; ++i) {  // within the blocks of 16 pixels that are measured
+    if (random.next() % 2 == 0) squares(cv::Rect(i % 5 * 32, i / 5 * 32, 32, 32)) = 0;
+  }
+  EXPECT_GT(value_of(score_of(squares), "contrast"), 90);
+  cv::Mat few(120, 220, CV_8UC1, cv::Scalar(255));
+  cv::putText(few, "three words", {20, 60}, cv::FONT_HERSHEY_SIMPLEX, 1, 0, 3);
+  EXPECT_GT(value_of(score_of(few), "contrast"), 90);
+}
+
 TEST(Score, NamesPrintThatIsTooFine) {
   cv::Mat page(240, 320, CV_8UC1, cv::Scalar(255));
   for (int line = 0; line < 22; ++line) {
@@ -310,6 +322,9 @@ TEST(Simulation, TellsItsRangeInAPersonsWords) {
   simulation.width_mm = 0;
   EXPECT_EQ(range_sentence(simulation),
             "this camera recognises it from 0.75 to 8 times its width and up to 62 degrees");
+  simulation.range.tilt_deg = 0;
+  EXPECT_EQ(range_sentence(simulation),
+            "this camera recognises it from 0.75 to 8 times its width and only without tilt");
   simulation.width_mm = 100;
   simulation.curved = true;
   simulation.range = {1.5, 11.0, 40.0, 70.0};
@@ -318,6 +333,33 @@ TEST(Simulation, TellsItsRangeInAPersonsWords) {
             "degrees around it");
   simulation.range = {};
   EXPECT_EQ(range_sentence(simulation), "this camera does not recognise it at any distance");
+}
+
+/// A band of values 0, 10, 20... with those shares of right frames, in percent.
+SimulatedBand band_of(const char* name, const std::vector<int>& shares) {
+  SimulatedBand band{name, "", {}};
+  for (const int share : shares) {
+    SimulatedValue& value = band.values.emplace_back();
+    value.value = 10.0 * static_cast<double>(band.values.size() - 1);
+    value.outcome.figures.frames = 100;
+    value.outcome.figures.right = share;
+  }
+  return band;
+}
+
+TEST(Simulation, ItsRangeOutlivesADip) {
+  const auto tilt = [](const std::vector<int>& shares) {
+    return range_of({band_of("tilt", shares)}).tilt_deg;
+  };
+  EXPECT_EQ(tilt({100, 85, 100, 100, 100, 20, 0}), 40);
+  EXPECT_EQ(tilt({85, 100, 100, 100, 100, 20, 0}), 40);
+  EXPECT_EQ(tilt({100, 50, 100, 100, 100, 100, 0}), 50);  // 92 % of all
+  EXPECT_EQ(tilt({100, 40, 100, 100, 40, 100, 0}), 0);    // too few of any larger range
+  EXPECT_EQ(tilt({100, 100, 89, 0, 100}), 10);
+  const auto far = range_of({band_of("distance", {0, 80, 100, 100, 85, 100, 95, 60, 100, 0})});
+  EXPECT_EQ(far.nearest, 20);
+  EXPECT_EQ(far.farthest, 80);  // 91 % of all
+  EXPECT_EQ(range_of({band_of("distance", {0, 50, 0})}).farthest, 0);
 }
 
 /// Settings at one distance, in pixels of the pattern's side in the frame.
