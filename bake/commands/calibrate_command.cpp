@@ -64,6 +64,9 @@ Result<ExitCode> run_calibrate(CalibrateCommand& command) {
   MODAR_TRY(keep_other_kinds(command.output, "camera file",
                              [](std::string_view start) { return start.starts_with("%YAML"); }));
   MODAR_TRY(try_output(command.output, 0));
+  if (!command.options.pattern.empty()) {
+    MODAR_ASSIGN(command.options.shape, shape_of(command.options.pattern, ""));
+  }
   ProgressBar bar(command.quiet);
   const auto calibration = calibrate(
       command.options, [&](const std::string& what, double done) { bar.show(what, done); });

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "bake/commands/command_line.hpp"
+#include "bake/pattern/pattern.hpp"
 
 namespace modar {
 
@@ -20,5 +21,8 @@ void add_adopt(CommandLine& program);
 void add_studio(CommandLine& program);
 void add_web(CommandLine& program);
 void add_document(CommandLine& program);
+
+/// The shape of a pattern's file: as told, else as the bake cuts it out of a photo, which is said.
+Result<ShapeRequest> shape_of(const std::string& path, const std::string& told);
 
 }  // namespace modar

@@ -263,15 +263,8 @@ void print_failure(const Error& error, ExitCode& answer) {
 }
 
 Result<NamedScore> score_named(const ScoreCommand& command, const std::string& path) {
-  PatternRequest pattern{path};
-  if (command.shape.empty()) {  // as the bake cuts it out
-    std::vector<Diagnostic> said;
-    MODAR_TRY(find_picture(pattern, said));
-    std::ranges::for_each(said, print_diagnostic);
-  } else {
-    MODAR_ASSIGN(pattern.shape, parse_shape(command.shape));
-  }
-  MODAR_ASSIGN(ScoredPicture scored, score_file(path, 0, pattern.shape, command.jobs));
+  MODAR_ASSIGN(const ShapeRequest shape, shape_of(path, command.shape));
+  MODAR_ASSIGN(ScoredPicture scored, score_file(path, 0, shape, command.jobs));
   if (!command.overlay_folder.empty()) {
     MODAR_ASSIGN(const std::string out, picture_of(path, command.overlay_folder));
     MODAR_TRY(write_png(score_overlay(scored.shaped.picture.view(), scored.score), out));
@@ -380,9 +373,6 @@ Result<void> complete(SimulateCommand& command) {
     if (!camera) return tl::unexpected(camera.error());
     command.options.camera = *camera;
   }
-  if (!command.shape.empty()) {
-    MODAR_ASSIGN(command.options.shape, parse_shape(command.shape));
-  }
   if (!command.backgrounds.empty()) {
     auto photos = pictures_of(command.backgrounds);
     if (!photos) return tl::unexpected(photos.error());
@@ -391,8 +381,9 @@ Result<void> complete(SimulateCommand& command) {
   return {};
 }
 
-Result<Simulation> simulate_file(const SimulateCommand& command, const std::string& path,
+Result<Simulation> simulate_file(SimulateCommand& command, const std::string& path,
                                  ProgressBar& bar) {
+  MODAR_ASSIGN(command.options.shape, shape_of(path, command.shape));
   MODAR_ASSIGN(Simulation simulation,
                simulate(path, command.options,
                         [&](const std::string&, double done) { bar.show(file_stem(path), done); }));
@@ -532,7 +523,9 @@ Result<ExitCode> run_confusion(ConfusionCommand& command) {
   ExitCode answer = ExitCode::kOk;
   std::vector<NamedPattern> patterns;
   for (const std::string& input : command.inputs) {
-    auto some = read_patterns({input}, command.options.jobs);
+    auto some = shape_of(input, "").and_then([&](const ShapeRequest& shape) {
+      return read_patterns(input, shape, command.options.jobs);
+    });
     if (!some) print_failure(some.error(), answer);
     if (some) std::move(some->begin(), some->end(), std::back_inserter(patterns));
   }
@@ -576,6 +569,15 @@ void add_confusion(CommandLine& pattern) {
 }
 
 }  // namespace
+
+Result<ShapeRequest> shape_of(const std::string& path, const std::string& told) {
+  if (!told.empty()) return parse_shape(told);
+  PatternRequest pattern{path};
+  std::vector<Diagnostic> said;
+  MODAR_TRY(find_picture(pattern, said));
+  std::ranges::for_each(said, print_diagnostic);
+  return std::move(pattern.shape);
+}
 
 void add_pattern(CommandLine& program) {
   CommandLine& line = program.command(

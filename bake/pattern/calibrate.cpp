@@ -492,7 +492,7 @@ Result<Calibration> calibrate(const CalibrateOptions& options, const ProgressCal
   const bool board = options.board_columns > 0;
   std::vector<NamedPattern> patterns;
   if (!board) {
-    MODAR_ASSIGN(patterns, read_patterns({options.pattern}, 1));
+    MODAR_ASSIGN(patterns, read_patterns(options.pattern, options.shape, 1));
   }
   try {
     MODAR_ASSIGN(auto views, collect_views(options, board ? nullptr : &patterns.at(0), progress));

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "bake/pattern/shape.hpp"
 #include "bake/report.hpp"
 #include "formats/base/error.hpp"
 #include "modar/camera.hpp"
@@ -16,6 +17,7 @@ struct CalibrateOptions {
   int board_columns = 0;            ///< inner corners of the chessboard; 0: the plane is a pattern
   int board_rows = 0;
   std::string pattern;  ///< picture, or bundle whose first pattern it is
+  ShapeRequest shape;   ///< of a picture
   /// Views used, spread evenly over those that show the plane: twice as many would have 0.7 of the
   /// noise, and take eight times as long to solve.
   int most_views = 40;

@@ -77,18 +77,21 @@ Result<std::vector<std::byte>> bytes_of(const BundleContent& content) {
   return bytes;
 }
 
-Result<void> read_picture(const std::string& path, unsigned jobs, std::vector<NamedPattern>& out) {
-  bool shrunk = false;
-  MODAR_ASSIGN(auto picture, load_pattern(path, shrunk));
+Result<void> read_picture(const std::string& path, const ShapeRequest& shape, unsigned jobs,
+                          std::vector<NamedPattern>& out) {
+  MODAR_ASSIGN(ShapedPicture shaped, load_shaped(path, 0, shape));
+  const GrayImage gray = shaped.picture.view();
   TrackerRecordOptions options;
   options.jobs = jobs;
-  auto bundle = bundle_of_pattern(picture.view(), options);
-  if (!bundle) {
-    bundle.error().where = path;
-    return tl::unexpected(bundle.error());
+  auto record =
+      make_tracker_record(gray, options, surface_of(shaped.section, gray.width, gray.height));
+  if (!record) {
+    record.error().where = path;
+    return tl::unexpected(record.error());
   }
-  out.push_back(
-      {std::filesystem::path(path).stem().string(), std::move(picture), std::move(*bundle), {}});
+  MODAR_ASSIGN(auto bundle, bundle_of_record(gray, std::move(*record), shaped.section));
+  out.push_back({std::filesystem::path(path).stem().string(), std::move(shaped.picture),
+                 std::move(bundle), std::move(shaped.section)});
   return {};
 }
 
@@ -198,13 +201,11 @@ Result<std::vector<std::byte>> bundle_of_records(std::span<const GrayPicture> pa
   return bytes_of(content);
 }
 
-Result<std::vector<NamedPattern>> read_patterns(const std::vector<std::string>& paths,
+Result<std::vector<NamedPattern>> read_patterns(const std::string& path, const ShapeRequest& shape,
                                                 unsigned jobs) {
   std::vector<NamedPattern> patterns;
-  for (const std::string& path : paths) {
-    const bool bundle = std::filesystem::path(path).extension() == ".modar";
-    MODAR_TRY(bundle ? read_bundle(path, patterns) : read_picture(path, jobs, patterns));
-  }
+  const bool bundle = std::filesystem::path(path).extension() == ".modar";
+  MODAR_TRY(bundle ? read_bundle(path, patterns) : read_picture(path, shape, jobs, patterns));
   return patterns;
 }
 

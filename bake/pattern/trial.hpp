@@ -14,6 +14,7 @@
 #include "bake/pattern/picture.hpp"
 #include "bake/pattern/record.hpp"
 #include "bake/pattern/scene.hpp"
+#include "bake/pattern/shape.hpp"
 #include "formats/base/error.hpp"
 #include "modar/camera.hpp"
 #include "modar/tracker.hpp"
@@ -43,10 +44,10 @@ struct NamedPattern {
   std::vector<std::byte> shape{};  ///< its SectionType::kPatternShape section; empty: flat
 };
 
-/// The patterns of bundles (*.modar, from their tracker records) and of pictures, in the order of
-/// the files. Errors: those of opening and of baking; kInvalidInput "confusion.record" (a bundle
-/// with a pattern whose tracker record is missing or invalid).
-Result<std::vector<NamedPattern>> read_patterns(const std::vector<std::string>& paths,
+/// The patterns of a bundle (*.modar, from their tracker records), or that of a picture. Errors:
+/// those of opening and of baking; kInvalidInput "confusion.record" (a bundle with a pattern whose
+/// tracker record is missing or invalid).
+Result<std::vector<NamedPattern>> read_patterns(const std::string& path, const ShapeRequest& shape,
                                                 unsigned jobs);
 
 /// What a frame truly shows.
