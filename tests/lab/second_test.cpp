@@ -153,6 +153,13 @@ TEST_F(SecondTest, GoodBundlesDifferInNothing) {
   }
 }
 
+TEST_F(SecondTest, PolygonsThatGoAroundAgainAreOneRound) {
+  const std::string path =
+      write("again.obj", replaced(kObj, "f 4 3 2 1\n", "f 4 3 2 1 4 3 2 1 4 3 2 1 4\n"));
+  EXPECT_EQ(issues(path, path), Ids()) << details_;
+  EXPECT_EQ(issues(write("box.obj", kObj), path), Ids()) << details_;
+}
+
 TEST_F(SecondTest, PicturesContinueAsSamplersSay) {
   constexpr const char* kRepeat = R"("wrapS":10497,"wrapT":10497)";
   for (const char* const modes :

@@ -69,6 +69,20 @@ TEST(Triangulate, ConcavePolygonsAreTiledWithoutOverlap) {
                 {2, 2, 0}});
 }
 
+TEST(Triangulate, PolygonsThatGoAroundAgainAreOneRound) {
+  const std::vector<glm::dvec3> dart = {{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {2, 1, 0}, {0, 4, 0}};
+  for (const std::size_t corners : {6U, 7U, 10U, 25U, 5000U}) {
+    std::vector<glm::dvec3> polygon;
+    for (std::size_t i = 0; i < corners; ++i) polygon.push_back(dart[i % 5]);
+    std::vector<std::array<std::uint32_t, 3>> triangles;
+    EXPECT_TRUE(triangulate(polygon, triangles));
+    ASSERT_EQ(triangles.size(), 3U) << corners;
+    double sum = 0;
+    for (const auto& t : triangles) sum += area(polygon, t);
+    EXPECT_DOUBLE_EQ(sum, 10) << corners;
+  }
+}
+
 TEST(Triangulate, TangledPolygonsEndAndSaySo) {
   std::vector<std::array<std::uint32_t, 3>> triangles;
   const std::vector<glm::dvec3> bow = {{0, 0, 0}, {2, 2, 0}, {3, 0, 0}, {0, 2, 0}, {-1, 1, 0}};

@@ -1,6 +1,7 @@
 // Ear clipping in the plane that fits the polygon best.
 #include "bake/mesh/weld/triangulate.hpp"
 
+#include <algorithm>
 #include <cstddef>
 
 #include <glm/common.hpp>
@@ -114,9 +115,24 @@ bool clip_ears(const std::vector<glm::dvec2>& p, std::vector<Triangle>& out) {
   return clean;
 }
 
+/// Corners of one round, where a polygon goes around several times.
+std::size_t one_round(std::span<const glm::dvec3> p) {
+  if (p.size() < 4 || std::find(p.begin() + 3, p.end(), p[0]) == p.end()) return p.size();
+  // Of the polygon up to each corner, how many of its last corners are its first ones, too.
+  std::vector<std::size_t> repeated(p.size());
+  for (std::size_t i = 1; i < p.size(); ++i) {
+    std::size_t count = repeated[i - 1];
+    while (count > 0 && p[i] != p[count]) count = repeated[count - 1];
+    repeated[i] = count + (p[i] == p[count] ? 1 : 0);
+  }
+  const std::size_t round = p.size() - repeated.back();
+  return round < 3 ? p.size() : round;
+}
+
 }  // namespace
 
 bool triangulate(std::span<const glm::dvec3> positions, std::vector<Triangle>& out) {
+  positions = positions.first(one_round(positions));
   const auto n = static_cast<std::uint32_t>(positions.size());
   const auto fan = [&] {
     for (std::uint32_t i = 1; i + 1 < n; ++i) out.push_back({0, i, i + 1});

@@ -44,8 +44,15 @@ dvec3 direction(const dvec3& v) {
 /// Cuts off corners that contain no other one, until three are left.
 template <class Add>
 void triangulate(const Mesh& mesh, const Face& face, const Add& add) {
-  std::vector<std::size_t> left(face.corners.size());
-  for (std::size_t i = 0; i < left.size(); ++i) left[i] = i;
+  std::vector<std::size_t> left;
+  const auto again = [&](std::size_t round) {
+    for (std::size_t i = round; i < face.corners.size(); ++i) {
+      if (place(mesh, face.corners[i]) != place(mesh, face.corners[i - round])) return false;
+    }
+    return true;
+  };
+  do left.push_back(left.size());
+  while (left.size() < 3 || !again(left.size()));  // a polygon may go around several times
   const dvec3 up = direction(area_vector(mesh, face));
   const auto at = [&](std::size_t i) { return place(mesh, face.corners[left[i % left.size()]]); };
   const auto side = [&](const dvec3& a, const dvec3& b, const dvec3& c) {
