@@ -119,8 +119,10 @@ Result<std::string> read_file(const std::string& path, std::size_t most) {
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(
       is_regular_file(path) ? std::fopen(path.c_str(), "rb") : nullptr, &std::fclose);
   const auto unreadable = [&path] {
-    return missing_file(path, {ExitCode::kIo, "io.open", path, "the file cannot be opened or read",
-                               "check its name and permissions"});
+    return missing_file(
+        path, {ExitCode::kIo, "io.open", path,
+               path.empty() ? "the name of a file is empty" : "the file cannot be opened or read",
+               "check its name and permissions"});
   };
   if (std::error_code error; !file && std::filesystem::is_directory(path, error)) {
     return fail(ExitCode::kIo, "io.open", path, "it is a folder", "name a file in it");

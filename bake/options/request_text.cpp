@@ -136,7 +136,7 @@ ModelRequest parse_model(const std::string& text) {
 tl::expected<double, WrongValue> parse_millimetres(std::string_view text) {
   const std::size_t digits = unit_start(text);
   const std::string number(text.substr(0, digits));
-  const std::string unit(text.substr(digits));
+  const std::string unit(text.substr(std::min(text.find_first_not_of(' ', digits), text.size())));
   double value = 0;
   if (const std::size_t comma = number.find(','); comma != std::string::npos) {
     std::string point = number;

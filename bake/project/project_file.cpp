@@ -75,7 +75,7 @@ class TableReader {
   /// A length with its unit.
   Result<void> take_length(std::string_view key, double& mm) const {
     std::string text;
-    MODAR_TRY(take(key, text));
+    MODAR_TRY(take_as<std::string>(key, R"(a length in quotes, as in "210mm")", text));
     if (text.empty()) return {};
     const auto length = parse_millimetres(text);
     if (!length) return refused(key, "", length.error());
@@ -316,11 +316,17 @@ Keys keys_with_settings(Keys keys, std::optional<OptionPart> part) {
 }
 
 Error no_toml(const std::string& path, const toml::parse_error& error) {
+  constexpr std::pair<std::string_view, const char*> kCures[] = {
+      {"utf-8", "save it as UTF-8, which editors offer as an encoding"},
+      {"escape", "write / for \\, or enclose the text in '...'"},
+      {"','", "write numbers with a point (12.5), and quote texts; see toml.io"},
+      {"value type", "enclose texts in straight quotes: \"cover.png\""}};
+  const auto* cure = std::ranges::find_if(kCures, [&](const auto& one) {
+    return error.description().find(one.first) != std::string_view::npos;
+  });
   return {ExitCode::kInvalidInput, "project.toml", place(path, error.source()),
           std::string(error.description()),
-          error.description().find("','") == std::string_view::npos
-              ? "correct the line; see toml.io"
-              : "write numbers with a point (12.5), and quote texts; see toml.io"};
+          cure != std::end(kCures) ? cure->second : "correct the line; see toml.io"};
 }
 
 class ProjectReader {
@@ -445,15 +451,18 @@ class ProjectReader {
     MODAR_TRY(reader.parse_numbers("corners", corners));
     std::string height;
     double height_mm = 0;
-    MODAR_TRY(reader.take("height", height));
     MODAR_TRY(reader.take_length("height", height_mm));
+    MODAR_TRY(reader.take("height", height));
     if (text.empty() && (!corners.empty() || !height.empty())) text = "flat";
     if (!corners.empty()) text += ",corners=" + corners;
     if (!height.empty()) text += ",height=" + height;
     if (text.empty()) return {};
     auto parsed = parse_shape(text);
-    if (!parsed && corners.empty())
-      return reader.wrong("height", "it together with corners = [...]");
+    if (!parsed && corners.empty()) {
+      return reader.refused("height", "",
+                            {"without corners = it has no meaning",
+                             "state the width alone: the picture tells the height"});
+    }
     if (!parsed) return reader.wrong("corners", "[[212, 80], [905, 131], [870, 640], [190, 602]]");
     shape = std::move(*parsed);
     return {};

@@ -167,6 +167,8 @@ Result<Camera> read_camera_file(const std::string& path) {
     const cv::FileStorage file(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
     if (!file.isOpened()) return bad("camera.syntax", path, "OpenCV cannot read it");
     return read(file, path);
+  } catch (const cv::Exception& error) {
+    return bad("camera.syntax", path, "OpenCV cannot read it: " + error.err);
   } catch (const std::exception& error) {
     return bad("camera.syntax", path, std::string("OpenCV cannot read it: ") + error.what());
   }

@@ -160,12 +160,19 @@ class Files(ProjectTest):
             ("[[pattern]]\nfile = \"pictures/a.png\"\n[[scene]]\npattern = \"aa\"\n", "modar.toml:4", "did you mean 'a'",
              "project.scene-unknown"),
             ("[bake\n", "modar.toml:1", "project.toml"),
+            ("[[pattern]]\nfile = \"pictures\\a.png\"\n", "modar.toml:2", "write / for \\", "project.toml"),
+            ("[[pattern]]\nfile = \u201cpictures/a.png\u201d\n", "modar.toml:2", "straight quotes", "project.toml"),
+            ("[[pattern]]\nfile = \"pictures/a.png\"\nwidth = 210\n", "modar.toml:3", "as in \"210mm\"", "project.value"),
+            ("[[pattern]]\nfile = \"pictures/a.png\"\nwidth = \"8 inches\"\n", "modar.toml:3", "write 8in", "project.value"),
+            ("[[pattern]]\nfile = \"pictures/a.png\"\nheight = \"20cm\"\n", "modar.toml:3", "state the width alone", "project.value"),
             ("[tier]\nname = \"low\"\n", "modar.toml:1", "[[tier]]", "project.value"),
         ]
         for text, *words in mistakes:
             with self.subTest(text=text):
                 self.write(text)
                 self.assert_fails(self.modar("bake", cwd=self.place), 3, *words)
+        (self.place / "modar.toml").write_text("[bake]\n", "utf-16")
+        self.assert_fails(self.modar("bake", cwd=self.place), 3, "save it as UTF-8", "project.toml")
         self.assert_fails(self.modar("bake", cwd=self.folder), 2, "modar.toml", "modar init", "project.open")
         for option in ("--effort=fast", "-ox.modar", "--output=x.modar"):
             self.assert_fails(self.modar("bake", option, cwd=self.place), 1, "bake.project-option")

@@ -365,6 +365,7 @@ class Web(ProgramTest):
             except ConnectionError:
                 pass
         self.assertEqual(self.get(port, context, "/")[0], 200)
+        self.assert_fails(self.modar("web", self.bake_demo(), "-o", self.folder / "other", "--page", self.folder), 2, "contains no page", "web.page")
         self.assert_fails(self.modar("web", self.bake_demo(), "-o", self.folder / "site", "--page", self.page, "--serve", "--bind", "here",
                                      "--quiet"), 1, "web.bind")
 

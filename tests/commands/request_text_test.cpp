@@ -137,6 +137,7 @@ TEST(Pattern, WidthIsOptional) {
   EXPECT_DOUBLE_EQ(parse_pattern("p.png:210cm")->width_mm, 2100);
   EXPECT_DOUBLE_EQ(parse_pattern("p.png:0.5m")->width_mm, 500);
   EXPECT_DOUBLE_EQ(parse_pattern("p.png:2in")->width_mm, 50.8);
+  EXPECT_DOUBLE_EQ(parse_pattern("p.png:210 mm")->width_mm, 210);
   EXPECT_EQ(parse_pattern("p.png:210cm")->path, "p.png");
   EXPECT_EQ(parse_pattern("odd:name.m")->path, "odd:name.m");
   EXPECT_FALSE(parse_pattern("cover.png:-3cm"));
@@ -145,6 +146,7 @@ TEST(Pattern, WidthIsOptional) {
   const auto cure = [](const char* text) { return parse_pattern(text).error().cure; };
   EXPECT_EQ(cure("cover.png:20"), "write 20mm, 20cm or 20in");
   EXPECT_EQ(cure("cover.png:20inch"), "write 20in");
+  EXPECT_EQ(cure("cover.png:20 Zoll"), "name one of mm, cm, m, km, in, ft");
   EXPECT_EQ(cure("cover.png:21,0cm"), "write 21.0cm, with a point");
   EXPECT_FALSE(parse_pattern("cover.png:nanmm"));
 }

@@ -547,6 +547,9 @@ Result<Site> write_site(const SiteOptions& options) {
               Json::object(), Json::object(), {}, {}};
   if (draft.page.empty()) {
     MODAR_ASSIGN(draft.page, find_page());
+  } else if (!fs::exists(draft.page + "/words/en.json")) {
+    return fail(ExitCode::kIo, "web.page", draft.page, "this folder contains no page",
+                "leave out --page, or name the folder that the preset web builds");
   }
   MODAR_TRY(choose_languages(draft));
   MODAR_TRY(read_texts(draft));
