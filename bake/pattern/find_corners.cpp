@@ -43,6 +43,16 @@ constexpr double kLeastSharp = 0.6;
 // Of a figure around the one that was chosen, which makes that doubtful.
 constexpr double kSheetSupport = 0.6;
 constexpr double kSheetLeast = 1.04;
+// Share of a figure that another object on it has. A print's own picture has more, a logo less.
+constexpr double kLeastHeld = 0.05;
+constexpr double kMostHeld = 0.52;
+// Share of it that has detail at least: a printed box has none.
+constexpr double kLeastDetail = 0.05;
+// Share of all its sides that is sharp.
+constexpr double kSharpHeld = 0.82;
+// From a figure to the edges of a border around it, times its size.
+constexpr double kNearBorder = 0.02;
+constexpr double kFarBorder = 0.3;
 // Pixels beyond a corner in which continuing edges are looked for.
 constexpr double kBeyondFrom = 4;
 constexpr double kBeyondTo = 24;
@@ -636,6 +646,148 @@ bool goes_on(const Gradients& gradients, const std::array<Point, 4>& corners) {
   return false;
 }
 
+/// From the unit square to the photo.
+cv::Matx33d plane_of(const std::array<Point, 4>& corners) {
+  const std::array<cv::Point2f, 4> unit = {
+      {cv::Point2f(0, 0), cv::Point2f(1, 0), cv::Point2f(1, 1), cv::Point2f(0, 1)}};
+  std::array<cv::Point2f, 4> to;
+  std::ranges::copy(corners, to.begin());
+  return cv::getPerspectiveTransform(unit.data(), to.data());
+}
+
+Point on_plane(const cv::Matx33d& plane, double x, double y) {
+  const cv::Vec3d at = plane * cv::Vec3d(x, y, 1);
+  return {at[0] / at[2], at[1] / at[2]};
+}
+
+/// The share of a figure that has detail.
+double detail_in(const Gradients& gradients, const std::array<Point, 4>& figure) {
+  constexpr double kDetail = 12;  // gradient, steps of a colour channel per pixel
+  cv::Mat mask = cv::Mat::zeros(gradients.dx.size(), CV_8U);
+  const std::vector<cv::Point> outline(figure.begin(), figure.end());
+  cv::fillConvexPoly(mask, outline, 255);
+  const cv::Rect box = cv::boundingRect(outline) & cv::Rect(cv::Point(), mask.size());
+  if (box.empty()) return 0;
+  cv::Mat strength;
+  cv::magnitude(gradients.dx(box), gradients.dy(box), strength);
+  mask = mask(box);
+  return cv::countNonZero((strength > kDetail) & mask) /
+         std::max(1.0, 1.0 * cv::countNonZero(mask));
+}
+
+/// Larger or smaller about its middle.
+std::array<Point, 4> grown(const std::array<Point, 4>& figure, double times) {
+  const Point middle = (figure[0] + figure[1] + figure[2] + figure[3]) / 4;
+  std::array<Point, 4> out;
+  std::ranges::transform(figure, out.begin(),
+                         [&](const Point& corner) { return middle + times * (corner - middle); });
+  return out;
+}
+
+/// Whether a figure within another one is an object on it, by its size, its edges and its detail.
+bool is_held(const Gradients& gradients, const std::array<Point, 4>& ground,
+             const std::array<Point, 4>& held) {
+  const double share = area_of(held) / area_of(ground);
+  if (share < kLeastHeld || share > kMostHeld || !around(ground, held)) return false;
+  double sharp = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    sharp += sharp_along(gradients, held[i], held[(i + 1) % 4]) / 4;
+  }
+  return sharp > kSharpHeld && detail_in(gradients, grown(held, 0.92)) > kLeastDetail;
+}
+
+/// Whether a figure is in the middle of another one, as the picture within a border is.
+bool is_centred(const cv::Matx33d& outer, const std::array<Point, 4>& inner) {
+  constexpr double kUneven = 0.06;  // difference of margins, or turn, times the outer one's size
+  const cv::Matx33d back = outer.inv();
+  std::array<Point, 4> at;
+  std::ranges::transform(inner, at.begin(),
+                         [&](const Point& corner) { return on_plane(back, corner.x, corner.y); });
+  double uneven = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Point off = at[i] + at[(i + 2) % 4] - Point(1, 1);
+    const Point side = at[(i + 1) % 4] - at[i];
+    uneven = std::max({uneven, std::fabs(off.x), std::fabs(off.y),
+                       std::min(std::fabs(side.x), std::fabs(side.y))});
+  }
+  return uneven < kUneven;
+}
+
+/// Whether a figure of edges is on a ground that has few on each of its sides, unlike the figure.
+bool holds_a_figure(const Gradients& gradients, const std::vector<Figure>& figures,
+                    const std::array<Point, 4>& corners) {
+  constexpr double kTimesMore = 3;   // share of the figure that has detail against the ground's
+  constexpr std::size_t kMost = 20;  // figures that are looked at
+  const cv::Matx33d plane = plane_of(corners);
+  std::size_t seen = 0;
+  for (const Figure& figure : figures) {
+    const std::array<Point, 4>& c = figure.corners;
+    if (is_centred(plane, c) || !is_held(gradients, corners, c)) continue;
+    const std::array<Point, 4> near = grown(c, 1.06);
+    const std::array<Point, 4> far = grown(c, 1.2);
+    double ground = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::size_t k = (i + 1) % 4;
+      ground = std::max(ground, detail_in(gradients, {near[i], near[k], far[k], far[i]}));
+    }
+    if (detail_in(gradients, grown(c, 0.92)) > kTimesMore * ground) return true;
+    if (++seen == kMost) break;
+  }
+  return false;
+}
+
+/// Whether a figure is the ground of another object, as a table is a print's.
+bool holds_another(const cv::Mat& rgb, const Gradients& gradients,
+                   const std::array<Point, 4>& corners) {
+  constexpr double kInset = 0.02;  // of the figure: its edges are left out
+  const double side = kForegroundSide;
+  const double scale = (1 - 2 * kInset) / side;
+  const cv::Matx33d plane =
+      plane_of(corners) * cv::Matx33d(scale, 0, kInset, 0, scale, kInset, 0, 0, 1);
+  cv::Mat inside;
+  cv::warpPerspective(rgb, inside, plane, cv::Size(kForegroundSide, kForegroundSide),
+                      cv::INTER_LINEAR | cv::WARP_INVERSE_MAP);
+  const Foreground object(inside);
+  if (!object.known()) return false;
+  std::array<Point, 4> held;
+  std::ranges::transform(object.corners(), held.begin(),
+                         [&](const Point& at) { return on_plane(plane, at.x, at.y); });
+  return is_held(gradients, corners, refine(gradients, held, {4, 2.5, 1.2}));
+}
+
+/// Whether edges are at equal distances to both sides of a figure, and above and below it, as
+/// those of a border are around the picture in it.
+bool bordered(const Gradients& gradients, const std::array<Point, 4>& corners) {
+  constexpr std::size_t kSteps = 160;  // a pixel each
+  constexpr double kEqualRatio = 1.5;  // most ratio of two distances that are equal
+  const cv::Matx33d plane = plane_of(corners);
+  const auto distance = [](std::size_t k) {
+    return kNearBorder + (kFarBorder - kNearBorder) * static_cast<double>(k) / kSteps;
+  };
+  // Of each side, whether an edge is that far from it.
+  std::array<std::array<bool, kSteps>, 4> seen{};
+  for (std::size_t k = 0; k < kSteps; ++k) {
+    const double off = distance(k);
+    const std::array<std::array<Point, 2>, 4> sides = {
+        {{on_plane(plane, 0, -off), on_plane(plane, 1, -off)},
+         {on_plane(plane, 1 + off, 0), on_plane(plane, 1 + off, 1)},
+         {on_plane(plane, 1, 1 + off), on_plane(plane, 0, 1 + off)},
+         {on_plane(plane, -off, 1), on_plane(plane, -off, 0)}}};
+    for (std::size_t i = 0; i < 4; ++i) {
+      seen[i][k] = sharp_along(gradients, sides[i][0], sides[i][1], true) >= kSheetSupport;
+    }
+  }
+  const auto both = [&](std::size_t one, std::size_t other) {
+    for (std::size_t k = 0; k < kSteps; ++k) {
+      for (std::size_t m = k; m < kSteps && distance(m) < kEqualRatio * distance(k); ++m) {
+        if ((seen[one][k] && seen[other][m]) || (seen[one][m] && seen[other][k])) return true;
+      }
+    }
+    return false;
+  };
+  return both(0, 2) && both(1, 3);
+}
+
 /// Printed frames are inside an object's own edges: the largest figure around the best one that has
 /// nearly its contrast.
 const Figure& outermost(const std::vector<Figure>& figures) {
@@ -756,6 +908,9 @@ Result<FoundCorners> search(const RgbaImage& photo) {
   found.fills = area_of(corners) > kFilled * small.cols * small.rows;
   found.framed = framed(figures, corners) || (!found.fills && goes_on(gradients, corners));
   found.rivalled = object.rivalled();
+  found.holds =
+      holds_another(small, gradients, corners) || holds_a_figure(gradients, figures, corners);
+  found.bordered = bordered(gradients, corners);
   const double fine = std::max(1.0, std::max(rgb.cols, rgb.rows) / kRefineSide);
   if (fine > 1) cv::resize(rgb, rgb, cv::Size(), 1 / fine, 1 / fine, cv::INTER_AREA);
   const double step = scale / fine;

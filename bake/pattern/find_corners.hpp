@@ -29,18 +29,20 @@ struct FoundCorners {
   /// Share of the weakest side on which the foreground ends, 0 to 1.
   double divided = 0;
   bool rivalled = false;  ///< another object of its size has contrast
+  bool holds = false;     ///< another object is on it: it may be the table
   bool framed = false;  ///< another figure surrounds it, or two of its edges continue: it may be a
                         ///< part of that
-  bool fills = false;   ///< nearly all of the photo, which may be the picture itself
+  bool bordered = false;  ///< edges are around it at equal distances: it may be within a border
+  bool fills = false;     ///< nearly all of the photo, which may be the picture itself
   /// Whether the corners are those of the foreground: then edges around it are
   /// the background's.
   [[nodiscard]] bool clear() const { return divided >= kClear && sharpness >= kClearEdge; }
   /// Why they may be wrong: "blurred", "framed", "rivalled" or "fills"; empty: they are sure.
   [[nodiscard]] const char* doubt() const {
-    if (clear() && rivalled) return "rivalled";
+    if (holds || (clear() && rivalled)) return "rivalled";
     const double least = divided > 0 ? kDoubtfulSharpness : kSureAlone;
     if (!clear() && sharpness < least) return "blurred";
-    if (framed && !(clear() && divided >= kClearFramed)) return "framed";
+    if (bordered || (framed && !(clear() && divided >= kClearFramed))) return "framed";
     return fills ? "fills" : "";
   }
 };

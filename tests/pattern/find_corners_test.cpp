@@ -224,6 +224,66 @@ TEST(FindPicture, WrongCornersAreWarnedOfAndRightOnesAreNot) {
   EXPECT_LE(alarms, photos / 10);
 }
 
+struct Verdict {
+  bool good = false;     ///< of find_picture()
+  bool doubted = false;  ///< the same
+  bool silent = false;   ///< wrong without a doubt, here or in find_corners()
+};
+
+Verdict verdict(const cv::Mat& bgr, const Corners& corners) {
+  const Photo photo{as_photo(bgr)};
+  const auto found = find_corners(photo.image);
+  const FoundPicture picture = find_picture(photo, found);
+  Verdict out;
+  out.good = picture.corners && apart(*picture.corners, corners) < 5;
+  out.doubted = *picture.doubt != 0;
+  const bool wrong = found && apart(found->corners, corners) >= 5;
+  out.silent = (!out.good && !out.doubted) || (wrong && *found->doubt() == 0);
+  return out;
+}
+
+TEST(FindPicture, ATableIsNotTakenForThePrintOnIt) {
+  const Corners edges = {{{180, 90}, {800, 130}, {850, 640}, {90, 600}}};
+  const Corners corners = {
+      {{300.3f, 210.6f}, {520.2f, 200.4f}, {540.8f, 430.1f}, {280.7f, 440.9f}}};
+  const cv::Mat room(720, 960, CV_8UC3, cv::Scalar(120, 150, 140));
+  int doubted = 0;
+  for (const char* pattern : {"mural.png", "game.png"}) {
+    for (const int how : {0, 1}) {
+      for (const double bright : {0.3, 1.6}) {
+        const cv::Mat table =
+            photograph(wood()(cv::Rect(100, 100, 640, 180)) * bright, room, edges);
+        const Verdict one = verdict(
+            photograph(printed(asset(pattern), how), shaded(table, corners), corners), corners);
+        EXPECT_FALSE(one.silent) << pattern << " printed " << how << " on " << bright;
+        doubted += one.doubted ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GE(doubted, 4) << "the table has the better edges";
+}
+
+TEST(FindPicture, TheInsideOfABlackBorderIsDoubted) {
+  const Corners corners = {
+      {{250.3f, 150.6f}, {720.2f, 120.4f}, {760.8f, 560.1f}, {220.7f, 520.9f}}};
+  int alarms = 0;
+  for (const char* name : {"painting.png", "cover.png"}) {
+    for (const double width : {0.06, 0.15}) {
+      for (const int ground : {40, 140}) {
+        cv::Mat pattern = asset(name);
+        const int border = cvRound(width * std::min(pattern.cols, pattern.rows));
+        cv::copyMakeBorder(pattern, pattern, border, border, border, border, cv::BORDER_CONSTANT,
+                           cv::Scalar(14, 14, 14));
+        const cv::Mat table(720, 960, CV_8UC3, cv::Scalar(ground - 4, ground, ground + 6));
+        const Verdict one = verdict(photograph(pattern, table, corners), corners);
+        EXPECT_FALSE(one.silent) << name << " " << width << " on " << ground;
+        alarms += one.good && one.doubted ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_EQ(alarms, 0);
+}
+
 TEST(FindPicture, AFileThatIsThePictureStaysWhole) {
   for (const char* name :
        {"cover.png", "game.png", "mural.png", "painting.png", "poems.png", "survey.png"}) {
