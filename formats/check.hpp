@@ -26,10 +26,12 @@ struct IssueKind {
   const char* cure;
 };
 
-/// All kinds of issues, in the order of their ids in ISSUES.md.
-std::span<const IssueKind> issue_kinds();
+/// The kinds of issues that opening a bundle finds, and those that only check_bundle() does, in the
+/// order of ISSUES.md.
+std::span<const IssueKind> opening_issue_kinds();
+std::span<const IssueKind> content_issue_kinds();
 
-/// The text of ISSUES.md, made from issue_kinds(), to which issue_rows() of other kinds may be
+/// The text of ISSUES.md, made from both, to which issue_rows() of other kinds may be
 /// added.
 std::string issues_markdown();
 

@@ -1,4 +1,4 @@
-// The constant part of every rule, the log of what broke them, and the text of ISSUES.md.
+// The rules that opening a bundle checks, the log of those that it breaks, and texts of numbers.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -18,7 +18,7 @@ constexpr const char* kRebake = "bake the bundle again; if that does not help, r
 constexpr const char* kFetch = "copy or download the file again, or bake it again";
 constexpr const char* kUpdate = "update this program, or bake with a version that it supports";
 
-constexpr IssueKind kIssueKinds[] = {
+constexpr auto kOpeningKinds = std::to_array<IssueKind>({
     {"BUNDLE_TRUNCATED", Severity::kError, "The file ends before the bundle does", kFetch},
     {"BUNDLE_MAGIC", Severity::kError, "The file is not a ModAR bundle",
      "pass a file that `modar bake` wrote"},
@@ -81,83 +81,8 @@ constexpr IssueKind kIssueKinds[] = {
     {"ACTION_LINK", Severity::kError, "A link does not lead to an https address",
      "write link https://museum.org/vase"},
     {"SECTION_HASH", Severity::kError, "A section's bytes do not match its hash", kFetch},
-    {"SECTION_PADDING", Severity::kError, "Bytes between sections are not zero", kFetch},
-    {"META_TEXT", Severity::kError,
-     "The bundle's description is not a JSON object in UTF-8, or its members are not as specified",
-     kRebake},
-    {"MODEL_PLACEMENT", Severity::kError,
-     "A model's scale and diagonal cannot describe one box, or its chunks do not fit into that "
-     "box",
-     kRebake},
-    {"MODEL_COUNTS", Severity::kError, "A model's counts differ from its contents", kRebake},
-    {"MODEL_ERRORS", Severity::kError, "A model's mean error is greater than its maximum", kRebake},
-    {"CHUNK_BOUNDS", Severity::kError, "A vertex is outside its chunk's box", kRebake},
-    {"CHUNK_LOOSE", Severity::kError, "A chunk's box is larger than its vertices need", kRebake},
-    {"CHUNK_OUTSIDE", Severity::kError, "A chunk's box extends past the unit cube", kRebake},
-    {"CHUNK_CONE", Severity::kError,
-     "A chunk's cone axis does not have unit length, or triangles face out of the cone", kRebake},
-    {"CHUNK_GRID", Severity::kWarning,
-     "Chunks of a model store integer positions on different grids: their borders may crack",
-     kRebake},
-    {"LEVEL_ORDER", Severity::kError,
-     "Levels of detail do not get coarser, or level 0 has a non-zero error", kRebake},
-    {"LEVEL_INDEX", Severity::kError, "An index refers to a vertex that its level lacks", kRebake},
-    {"VERTEX_NOT_FINITE", Severity::kError, "A vertex attribute is infinite or not a number",
-     kRebake},
-    {"VERTEX_NORMAL", Severity::kError, "A normal does not have unit length", kRebake},
-    {"MATERIAL_VALUES", Severity::kError, "A material's colour, shininess or opacity is unusable",
-     "correct the material in the source and bake again"},
-    {"TEXTURE_SIDES", Severity::kError,
-     "A texture that repeats or has mipmaps has sides that are not powers of two (OpenGL ES 2.0)",
-     kRebake},
-    {"TEXTURE_OVERLAP", Severity::kError, "Levels of a texture share bytes", kRebake},
-    {"TEXTURE_UNREFERENCED", Severity::kWarning, "Bytes of a texture belong to no level", kRebake},
-    {"PARAMETER_VALUES", Severity::kError,
-     "A parameter set has values that its detector cannot run with", kRebake},
-    {"KEYPOINT_OUTSIDE", Severity::kError, "A keypoint is outside its pattern", kRebake},
-    {"KEYPOINT_VALUES", Severity::kError, "A keypoint's size, angle or octave is impossible",
-     kRebake},
-    {"DESCRIPTOR_LENGTH", Severity::kError, "Descriptors do not have their detector's length",
-     kRebake},
-    {"PATTERN_WITHOUT_FEATURES", Severity::kWarning, "A pattern has too few features to be found",
-     "use a pattern with more texture"},
-    {"FEATURE_TEXT", Severity::kError,
-     "A feature text is not an OpenCV FileStorage or has no mapped twin", kRebake},
-    {"LOOP_RECORD", Severity::kError, "A pattern's tracker record is invalid", kRebake},
-    {"STATEMENT_DIFFERS", Severity::kError,
-     "The content summary differs from the records or payloads", kRebake},
-    {"MEDIA_FILE", Severity::kError,
-     "A video or sound is not what its record says, or not what every phone plays", kRebake},
-    {"CAPTIONS", Severity::kError, "Captions are not a WebVTT file of the kind that bundles hold",
-     kRebake},
-    {"VERTEX_PADDING", Severity::kError, "Padding bytes of a vertex are not zero", kRebake},
-    {"VERTEX_OCCLUSION", Severity::kError, "A vertex's occlusion is above 127", kRebake},
-    {"PATTERN_YML_DIFFERS", Severity::kError,
-     "A feature text, read by OpenCV, differs from its mapped twin", kRebake},
-    {"VERTICES_UNREFERENCED", Severity::kWarning, "Bytes of the vertex buffer belong to no level",
-     kRebake},
-    {"INDICES_UNREFERENCED", Severity::kWarning, "Bytes of the index buffer belong to no level",
-     kRebake},
-    {"TRIANGLE_DEGENERATE", Severity::kWarning, "A triangle uses one vertex twice", kRebake},
-    {"LEVEL_EMPTY", Severity::kWarning, "A level of detail has no triangles", kRebake},
-    {"BUNDLE_EMPTY", Severity::kWarning, "The bundle holds neither models nor patterns",
-     "bake it with --model or --pattern"},
-    {"NEVER_SHOWN", Severity::kWarning,
-     "A model is on no pattern, or nothing is on a pattern: visitors download it and never see it",
-     "add a scene of it, or leave it out"},
-    {"NODE_TEXT", Severity::kWarning, "A label lacks a title in a language that others have",
-     "write title.LANGUAGE for each language"},
-    {"CAPTIONS_MISSING", Severity::kWarning,
-     "Something is heard that has no captions, or none in a language that others have (WCAG 1.2.1, "
-     "1.2.2)",
-     "write captions.LANGUAGE = \"FILE.vtt\" for each language"},
-    {"MEDIA_FLASHES", Severity::kWarning,
-     "A video flashes more than three times in a second, which can cause seizures (WCAG 2.3.1)",
-     "cut or darken what flashes, and bake again"},
-    {"SECTION_UNKNOWN", Severity::kInfo, "An optional section of an unknown type is skipped",
-     "update this program to use its contents"},
-};
-static_assert(std::size(kIssueKinds) == static_cast<std::size_t>(Rule::kCount));
+});
+static_assert(kOpeningKinds.size() == static_cast<std::size_t>(Rule::kPadding));
 
 const char* severity_word(Severity severity) {
   static constexpr char kWords[][8] = {"error", "warning", "info"};  // no pointers to relocate
@@ -166,12 +91,8 @@ const char* severity_word(Severity severity) {
 
 }  // namespace
 
-std::span<const IssueKind> issue_kinds() {
-  return kIssueKinds;
-}
-
-const IssueKind& issue_kind(Rule rule) {
-  return kIssueKinds[static_cast<std::size_t>(rule)];
+std::span<const IssueKind> opening_issue_kinds() {
+  return kOpeningKinds;
 }
 
 std::string error_code(const IssueKind& kind) {
@@ -189,7 +110,9 @@ std::string error_code(const IssueKind& kind) {
 }
 
 void FaultLog::add(Rule rule, std::uint64_t offset, std::string where, std::string detail) {
-  const IssueKind& kind = issue_kind(rule);
+  constexpr std::size_t kOpening = kOpeningKinds.size();
+  const auto number = static_cast<std::size_t>(rule);
+  const IssueKind& kind = number < kOpening ? kOpeningKinds[number] : content_[number - kOpening];
   const bool is_error = kind.severity == Severity::kError;
   if (sink_ != nullptr) {
     if (is_error) ++errors_;
@@ -240,8 +163,9 @@ std::string number_text(double value) {
 /// strtod agree on the locale's decimal point, which becomes '.'.
 std::string number_text(double value) {
   std::array<char, 40> text{};
-  constexpr int kExact = 17;  // digits tell any double apart
-  for (int digits = 1; digits <= kExact; ++digits) {
+  // Fewer than 15 digits come back from 15, as %g writes no zeros at the end; 17 tell any double
+  // apart.
+  for (int digits = 15; digits <= 17; ++digits) {
     std::snprintf(text.data(), text.size(), "%.*g", digits, value);
     if (std::strtod(text.data(), nullptr) == value) break;
   }
@@ -271,7 +195,7 @@ std::string issues_markdown() {
          "Ids are stable. A bundle with an error fails validation; warnings do not matter for "
          "that.\n\n"
          "| id | severity | fault | what to do |\n|---|---|---|---|\n" +
-         issue_rows(kIssueKinds);
+         issue_rows(opening_issue_kinds()) + issue_rows(content_issue_kinds());
 }
 
 }  // namespace modar

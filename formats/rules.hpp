@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 
 #include "formats/base/error.hpp"
@@ -9,7 +10,8 @@
 
 namespace modar {
 
-/// In the order of issue_kinds(); a new rule is appended to its group here and there.
+/// In the order of opening_issue_kinds() and content_issue_kinds(); a new rule is appended to its
+/// group here and there.
 enum class Rule : std::uint8_t {
   kTruncated,
   kMagicBytes,
@@ -48,7 +50,7 @@ enum class Rule : std::uint8_t {
   kAction,
   kActionLink,
   kSectionHash,
-  kPadding,
+  kPadding,  ///< from here on found by checks of the contents alone
   kMetaText,
   kModelPlacement,
   kModelCounts,
@@ -92,9 +94,6 @@ enum class Rule : std::uint8_t {
   kCount
 };
 
-/// The constant part of a rule.
-const IssueKind& issue_kind(Rule rule);
-
 /// "bundle.section-order" for BUNDLE_SECTION_ORDER.
 std::string error_code(const IssueKind& kind);
 
@@ -102,9 +101,10 @@ std::string error_code(const IssueKind& kind);
 /// it hands every fault on. Allocates nothing while there is nothing to tell.
 class FaultLog {
  public:
+  /// For the rules before Rule::kPadding alone, which opening checks.
   FaultLog() = default;
   /// `sink` must outlive the log.
-  explicit FaultLog(const IssueSink& sink) : sink_(&sink) {}
+  explicit FaultLog(const IssueSink& sink) : sink_(&sink), content_(content_issue_kinds()) {}
 
   void add(Rule rule, std::uint64_t offset, std::string where, std::string detail);
   /// True once there is nothing more to be gained from looking on.
@@ -116,6 +116,7 @@ class FaultLog {
 
  private:
   const IssueSink* sink_ = nullptr;
+  std::span<const IssueKind> content_;
   std::uint64_t errors_ = 0;
   Error first_;
 };

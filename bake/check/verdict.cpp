@@ -113,8 +113,10 @@ Verdict device_verdict(const BundleView& bundle, const DeviceProfile& device) {
 
 std::vector<const IssueKind*> all_issue_kinds() {
   std::vector<const IssueKind*> kinds;
-  for (const IssueKind& kind : issue_kinds()) kinds.push_back(&kind);
-  for (const IssueKind& kind : workstation_issue_kinds()) kinds.push_back(&kind);
+  for (const auto part :
+       {opening_issue_kinds(), content_issue_kinds(), workstation_issue_kinds()}) {
+    for (const IssueKind& kind : part) kinds.push_back(&kind);
+  }
   return kinds;
 }
 

@@ -12,7 +12,7 @@ namespace modar {
 namespace {
 
 const IssueKind* yml_issue_kind() {
-  for (const IssueKind& kind : issue_kinds()) {
+  for (const IssueKind& kind : content_issue_kinds()) {
     if (std::strcmp(kind.id, "PATTERN_YML_DIFFERS") == 0) return &kind;
   }
   return nullptr;

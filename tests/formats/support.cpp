@@ -76,4 +76,12 @@ std::string source_path(const std::string& relative) {
   return std::string(root != nullptr ? root : ".") + "/" + relative;
 }
 
+std::vector<IssueKind> issue_kinds() {
+  std::vector<IssueKind> all;
+  for (const auto part : {opening_issue_kinds(), content_issue_kinds()}) {
+    all.insert(all.end(), part.begin(), part.end());
+  }
+  return all;
+}
+
 }  // namespace modar::test

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "formats/bundle_writer.hpp"
+#include "formats/check.hpp"
 #include "formats/layout.hpp"
 
 namespace modar::test {
@@ -71,5 +72,8 @@ std::vector<std::string> report(std::span<const std::byte> bytes);
 
 Bytes read_file(const std::string& path);
 std::string source_path(const std::string& relative);
+
+/// Of opening and of contents, in the order of ISSUES.md.
+std::vector<IssueKind> issue_kinds();
 
 }  // namespace modar::test
