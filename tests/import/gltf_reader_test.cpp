@@ -275,7 +275,10 @@ TEST_F(Gltf, RequiredExtensionsAreReadOrRefusedByName) {
   std::sort(ids.begin(), ids.end());
   EXPECT_EQ(ids, (std::vector<std::string>{"gltf.alpha-mask", "gltf.left-out"}));
   EXPECT_EQ(used->diagnostics.back().message,
-            "left out: 1 animation, extensions KHR_materials_clearcoat");
+            "left out: 1 animation (the pose of the file's nodes is baked), extensions "
+            "KHR_materials_clearcoat");
+  EXPECT_EQ(used->diagnostics.back().cure,
+            "for another pose, apply it to the model and export it again");
 }
 
 TEST_F(Gltf, GlassAndGlossinessHaveTheCoresNearest) {

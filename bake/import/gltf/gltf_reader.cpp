@@ -382,7 +382,8 @@ void report_left_out(const tinygltf::Model& gltf, const LeftOut& counts, const s
     if (count == 0) return;
     words += (words.empty() ? "" : ", ") + std::to_string(count) + " " + (count == 1 ? one : many);
   };
-  add(gltf.animations.size(), "animation", "animations");
+  add(gltf.animations.size(), "animation (the pose of the file's nodes is baked)",
+      "animations (the pose of the file's nodes is baked)");
   add(counts.morphs, "set of morph targets (at its default weights)",
       "sets of morph targets (at their default weights)");
   add(counts.hidden, "hidden node", "hidden nodes");
@@ -397,9 +398,11 @@ void report_left_out(const tinygltf::Model& gltf, const LeftOut& counts, const s
   if (!extensions.empty()) words += (words.empty() ? "" : ", ") + ("extensions " + extensions);
   if (words.empty()) return;
   const bool shows = !gltf.animations.empty() || counts.morphs + counts.lines_and_points != 0;
-  diagnostics.push_back({"gltf.left-out",
-                         shows ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo, label, 0,
-                         "left out: " + words, ""});
+  diagnostics.push_back(
+      {"gltf.left-out", shows ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo, label, 0,
+       "left out: " + words,
+       gltf.animations.empty() ? ""
+                               : "for another pose, apply it to the model and export it again"});
 }
 
 // How tinygltf reads the files that a model names: regular ones, under the names as they stand.
