@@ -9,6 +9,7 @@
 #include "modar/camera_yml.hpp"
 #include "overlay.hpp"
 #include "raw_source.hpp"
+#include "recording.hpp"
 #include "scene_media.hpp"
 #include "screen.hpp"
 #include "taps.hpp"
@@ -82,6 +83,18 @@ Result<std::unique_ptr<FrameSink>> open_report(const std::string& folder, double
                                                const ReportTitle& /*title*/,
                                                std::span<const std::string> /*pattern_names*/) {
   return left_out("out.unsupported", folder, "reports");
+}
+
+Result<Recording> read_recording(const std::string& folder) {
+  return left_out("golden.unsupported", folder, "comparisons with recordings");
+}
+
+GoldenCheck::GoldenCheck(Recording recording, double tolerance)
+    : recording_(std::move(recording)), tolerance_(tolerance) {}
+void GoldenCheck::add(const FrameReport& /*report*/,
+                      std::span<const std::string> /*pattern_names*/) {}
+std::string GoldenCheck::line() const {
+  return {};
 }
 
 Result<void> write_frame_picture(const std::string& path, const RgbImage& image) {

@@ -1,4 +1,4 @@
-// Statistics, and JSON by RapidJSON: shortest digits that read back the same, in any locale.
+// Statistics, and their JSON.
 #include "frame_report.hpp"
 
 #include <sys/mman.h>
@@ -9,13 +9,11 @@
 #include <cmath>
 #include <cstdio>
 
-#define RAPIDJSON_NOMEMBERITERATORCLASS
-#include <rapidjson/stringbuffer.h>
-#include <rapidjson/writer.h>
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
 
+#include "json_text.hpp"
 #include "modar/pose.hpp"
 
 namespace modar {
@@ -52,111 +50,93 @@ StageTimes RunStats::quantile_ms(double share) const {
 
 namespace {
 
-using Writer = rapidjson::Writer<rapidjson::StringBuffer>;
-
-void text(Writer& writer, std::string_view value) {
-  writer.String(value.data(), static_cast<rapidjson::SizeType>(value.size()));
-}
-void text(Writer& writer, const char* key, std::string_view value) {
-  writer.Key(key);
-  text(writer, value);
+void text(JsonText& writer, const char* key, std::string_view value) {
+  writer.key(key);
+  writer.text(value);
 }
 
-void count(Writer& writer, const char* key, std::uint64_t value) {
-  writer.Key(key);
-  writer.Uint64(value);
+void count(JsonText& writer, const char* key, std::uint64_t value) {
+  writer.key(key);
+  writer.count(value);
 }
 
-/// null where it is not finite.
-void number(Writer& writer, double value) {
-  if (std::isfinite(value)) {
-    writer.Double(value);
-  } else {
-    writer.Null();
-  }
-}
-void number(Writer& writer, const char* key, double value) {
-  writer.Key(key);
-  number(writer, value);
+void number(JsonText& writer, const char* key, double value) {
+  writer.key(key);
+  writer.number(value);
 }
 
 /// To three decimals, which times are worth.
-void rounded(Writer& writer, const char* key, double value) {
+void rounded(JsonText& writer, const char* key, double value) {
   number(writer, key, std::round(value * 1000.0) / 1000.0);
 }
 
 /// An object under a key, whose members `fill` writes.
 template <class Fill>
-void object(Writer& writer, const char* key, const Fill& fill) {
-  writer.Key(key);
-  writer.StartObject();
+void object(JsonText& writer, const char* key, const Fill& fill) {
+  writer.key(key);
+  writer.open('{');
   fill();
-  writer.EndObject();
+  writer.close('}');
 }
 
 /// An array under a key, whose elements `fill` writes.
 template <class Fill>
-void array(Writer& writer, const char* key, const Fill& fill) {
-  writer.Key(key);
-  writer.StartArray();
+void array(JsonText& writer, const char* key, const Fill& fill) {
+  writer.key(key);
+  writer.open('[');
   fill();
-  writer.EndArray();
+  writer.close(']');
 }
 
 /// An object whose members fill(writer) writes, without a line's end.
 template <class Fill>
 std::string json_line(const Fill& fill) {
-  rapidjson::StringBuffer buffer;
-  Writer writer(buffer);
-  writer.StartObject();
+  JsonText writer;
+  writer.open('{');
   fill(writer);
-  writer.EndObject();
-  return {buffer.GetString(), buffer.GetSize()};
+  writer.close('}');
+  return writer.str();
 }
 
 /// Of the unit square to the corners.
-void homography(Writer& writer, const std::array<glm::dvec2, 4>& corners) {
+void homography(JsonText& writer, const std::array<glm::dvec2, 4>& corners) {
   constexpr std::array<glm::dvec2, 4> kSquare = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
   const auto map = homography_from_points(kSquare, corners);
-  if (!map) {
-    writer.Key("homography");
-    writer.Null();
-    return;
-  }
+  if (!map) return number(writer, "homography", NAN);
   array(writer, "homography", [&] {
     for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) number(writer, (*map)[column][row]);
+      for (int column = 0; column < 3; ++column) writer.number((*map)[column][row]);
     }
   });
 }
 
-void detection(Writer& writer, const Detection& seen, std::span<const std::string> names,
+void detection(JsonText& writer, const Detection& seen, std::span<const std::string> names,
                bool homographies) {
-  writer.StartObject();
+  writer.open('{');
   text(writer, "pattern", seen.pattern < names.size() ? std::string_view(names[seen.pattern]) : "");
   array(writer, "corners", [&] {
     for (const glm::dvec2& corner : seen.corners) {
-      writer.StartArray();
-      number(writer, corner.x);
-      number(writer, corner.y);
-      writer.EndArray();
+      writer.open('[');
+      writer.number(corner.x);
+      writer.number(corner.y);
+      writer.close(']');
     }
   });
   array(writer, "rotation", [&] {
     for (int row = 0; row < 3; ++row) {
       // GLM's first index is the column.
       for (int column = 0; column < 3; ++column) {
-        number(writer, seen.pose.rotation[column][row]);
+        writer.number(seen.pose.rotation[column][row]);
       }
     }
   });
   array(writer, "translation", [&] {
-    for (int i = 0; i < 3; ++i) number(writer, seen.pose.translation[i]);
+    for (int i = 0; i < 3; ++i) writer.number(seen.pose.translation[i]);
   });
   if (seen.stretch != glm::dmat4x3(1.0)) {
     array(writer, "stretch", [&] {
       for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 4; ++column) number(writer, seen.stretch[column][row]);
+        for (int column = 0; column < 4; ++column) writer.number(seen.stretch[column][row]);
       }
     });
   }
@@ -166,16 +146,16 @@ void detection(Writer& writer, const Detection& seen, std::span<const std::strin
   rounded(writer, "agreeing", seen.agreeing);
   rounded(writer, "likeness", seen.likeness);
   if (seen.extended) {
-    writer.Key("extended");
-    writer.Bool(true);
+    writer.key("extended");
+    writer.flag(true);
     number(writer, "position_sigma", seen.position_sigma);
     number(writer, "rotation_sigma", seen.rotation_sigma);
   }
   if (homographies) homography(writer, seen.corners);
-  writer.EndObject();
+  writer.close('}');
 }
 
-void camera(Writer& writer, const CameraReport& camera) {
+void camera(JsonText& writer, const CameraReport& camera) {
   object(writer, "camera", [&] {
     rounded(writer, "focal_px", camera.focal.focal);
     if (camera.focal.estimated) rounded(writer, "sigma_px", camera.focal.sigma);
@@ -186,14 +166,14 @@ void camera(Writer& writer, const CameraReport& camera) {
   });
 }
 
-void times(Writer& writer, const StageTimes& ms) {
+void times(JsonText& writer, const StageTimes& ms) {
   object(writer, "ms", [&] {
     for (std::size_t i = 0; i < ms.size(); ++i) rounded(writer, kStageNames[i], ms[i]);
   });
 }
 
 /// Of frames, by the reason why nothing was visible.
-void reasons(Writer& writer, const RunStats& stats) {
+void reasons(JsonText& writer, const RunStats& stats) {
   object(writer, "reasons", [&] {
     for (const Reason reason : kReasons) {
       if (stats.count(reason) > 0) count(writer, to_string(reason), stats.count(reason));
@@ -201,10 +181,10 @@ void reasons(Writer& writer, const RunStats& stats) {
   });
 }
 
-void scene(Writer& writer, const SceneState& log) {
+void scene(JsonText& writer, const SceneState& log) {
   if (!log.commands.empty()) {
     array(writer, "commands", [&] {
-      for (const std::string& each : log.commands) text(writer, each);
+      for (const std::string& each : log.commands) writer.text(each);
     });
   }
   if (!log.caption.empty()) text(writer, "caption", log.caption);
@@ -227,7 +207,7 @@ const char* to_string(Shown state) {
 
 std::string frame_line(const FrameReport& report, std::span<const std::string> pattern_names,
                        bool homographies) {
-  return json_line([&](Writer& writer) {
+  return json_line([&](JsonText& writer) {
     count(writer, "frame", report.frame);
     number(writer, "time_s", report.time_s);
     array(writer, "visible", [&] {
@@ -244,7 +224,7 @@ std::string frame_line(const FrameReport& report, std::span<const std::string> p
 }
 
 std::string summary_line(const RunStats& stats) {
-  return json_line([&](Writer& writer) {
+  return json_line([&](JsonText& writer) {
     object(writer, "summary", [&] {
       count(writer, "frames", stats.frames());
       count(writer, "dropped", stats.dropped());
@@ -265,7 +245,7 @@ std::string summary_line(const RunStats& stats) {
 }
 
 std::string turntable_line(const TurntableReport& report) {
-  return json_line([&](Writer& writer) {
+  return json_line([&](JsonText& writer) {
     count(writer, "frame", report.frame);
     text(writer, report.pattern ? "pattern" : "model", report.name);
     number(writer, "angle_deg", report.angle_deg);
@@ -278,11 +258,11 @@ std::string turntable_line(const TurntableReport& report) {
 namespace {
 
 /// Of a log: to three decimals, and 0 where it is not finite.
-void figure(Writer& writer, const char* key, double value) {
+void figure(JsonText& writer, const char* key, double value) {
   rounded(writer, key, std::isfinite(value) ? value : 0);
 }
 
-void times(Writer& writer, const RunStats& stats) {
+void times(JsonText& writer, const RunStats& stats) {
   const StageTimes median = stats.quantile_ms(0.5);
   const StageTimes most = stats.quantile_ms(0.95);
   const StageTimes worst = stats.quantile_ms(1);
@@ -297,7 +277,7 @@ void times(Writer& writer, const RunStats& stats) {
   });
 }
 
-void memory_of(Writer& writer, const MemoryByKind& memory) {
+void memory_of(JsonText& writer, const MemoryByKind& memory) {
   object(writer, "memory", [&] {
     count(writer, "resident", memory.resident);
     count(writer, "heap", memory.heap);
@@ -346,7 +326,7 @@ MemoryByKind measure_memory(std::span<const std::byte> mapped) {
 Result<QosLog> QosLog::create(const std::string& path, const QosHead& head, double every_s) {
   MODAR_ASSIGN(AtomicFile file, AtomicFile::create(path));
   QosLog log(std::move(file), every_s);
-  MODAR_TRY(log.write(json_line([&](Writer& writer) {
+  MODAR_TRY(log.write(json_line([&](JsonText& writer) {
     object(writer, "qos", [&] {
       count(writer, "version", 1);
       text(writer, "bundle", head.bundle);
@@ -376,7 +356,7 @@ Result<void> QosLog::add(const FrameReport& report, std::span<const std::string>
       if (each.pattern == pattern) detection = &each;
     }
     if (seen_[pattern] == (detection != nullptr)) continue;
-    const std::string line = json_line([&](Writer& writer) {
+    const std::string line = json_line([&](JsonText& writer) {
       text(writer, "event", detection != nullptr ? "found" : "lost");
       text(writer, "pattern", pattern_names[pattern]);
       count(writer, "frame", report.frame);
@@ -397,7 +377,7 @@ Result<void> QosLog::add(const FrameReport& report, std::span<const std::string>
 }
 
 Result<void> QosLog::window(const MemoryByKind& memory) {
-  const std::string line = json_line([&](Writer& writer) {
+  const std::string line = json_line([&](JsonText& writer) {
     object(writer, "second", [&] {
       figure(writer, "from_s", window_start_s_);
       count(writer, "frames", window_.frames());
