@@ -40,7 +40,7 @@ mkdir -p "$build"
 probe() { # COMPILER BUILD OUT FLAG...: links the probe with a build's pose loop
   compiler=$1 of=$2 out=$3
   shift 3
-  "$compiler" -O2 -std=c++20 -ffp-contract=off -I. -Iruntime/include "$@" tests/track/pose_bits.cpp \
+  "$compiler" -O2 -std=c++20 -ffp-contract=off -flto=auto -I. -Iruntime/include "$@" tests/track/pose_bits.cpp \
     "$of/runtime/libmodar_runtime.a" "$of/formats/libmodar_formats.a" -pthread -o "$out"
 }
 
@@ -118,7 +118,7 @@ null_probe() { # PREFIX OF THE COMPILER, BUILD
     $NF ~ /^e?gl[A-Z]/ { if ($(NF - 1) == "T") has[$NF] = 1; else if ($(NF - 1) == "U") wants[$NF] = 1 }
     END { for (name in wants) if (!has[name]) print "int " name "(void) { return 0; }" }' > "$build/null_rest.c"
   "$1gcc" -w -O2 -c "$build/null_rest.c" -o "$build/null_rest.o"
-  "$1g++" -O2 -std=c++20 -ffp-contract=off -I. -Iruntime/include -static -idirafter /usr/include \
+  "$1g++" -w -O2 -std=c++20 -ffp-contract=off -flto=auto -I. -Iruntime/include -static -idirafter /usr/include \
     tests/track/budget_probe.cpp "$build/null_gl.o" "$2/runtime/libmodar_runtime.a" \
     "$2/formats/libmodar_formats.a" "$build/null_rest.o" -pthread -o "$build/budget-probe"
 }
