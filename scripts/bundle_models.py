@@ -52,7 +52,7 @@ def check_models(bundle):
         check_layout(bundle, row)
     check_occlusion(bundle)
     for row in tables["materials"]:
-        flags_known(bundle, row, 3)
+        flags_known(bundle, row, 0xFFFF03)
         need(row["texture"] == NONE or row["texture"] < len(tables["textures"]),
              "BUNDLE_MATERIAL_RANGE", row["at"], "texture")
         values = [row["shininess"], row["opacity"]]

@@ -98,6 +98,15 @@ class Bake(ProgramTest):
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertLessEqual((self.folder / "cover.modar").stat().st_size, most)
 
+    def test_metal_is_read_by_the_second_reader_too(self):
+        (self.folder / "metal.mtl").write_text("newmtl brass\nKd 0.92 0.8 0.56\nPr 0.4\nPm 1\n")
+        (self.folder / "metal.obj").write_text("mtllib metal.mtl\nusemtl brass\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        self.assertEqual(self.modar("bake", "--model", "metal.obj", "-o", "metal.modar", "--quiet").returncode, 0)
+        read = subprocess.run(["python3", ROOT / "scripts" / "read_bundle.py", "metal.modar", "--json"], cwd=self.folder, capture_output=True,
+                              text=True)
+        self.assertEqual(read.returncode, 0, read.stderr)
+        self.assertEqual(json.loads(read.stdout)["materials"][0]["flags"] >> 8 & 255, 255)
+
     def test_numbers_next_to_zero_are_written_as_zero(self):
         """Smaller than a float's smallest normal number, 1.2e-38."""
         picture(self.folder / "picture.png")
