@@ -375,6 +375,25 @@ TEST(Check, RehashedByteChangesNeverCrash) {
   }
 }
 
+// bundle.md: mirrored and clamped only with repeat, and never both along one axis.
+TEST(Check, FlagsBeyondTheUnitSquareAgree) {
+  const auto reported = [](std::uint32_t flags) {
+    Bytes bytes = encode(texture_content());
+    record_of<TextureRecord>(bytes, SectionType::kTextures).flags = flags;
+    rehash(bytes);
+    const std::vector<std::string> lines = report(bytes);
+    return std::count_if(lines.begin(), lines.end(), [](const std::string& line) {
+      return line.starts_with("error BUNDLE_TEXTURE_RANGE");
+    });
+  };
+  for (const std::uint32_t good : {0u, 2u, 2u + 8, 2u + 16, 2u + 32, 2u + 64, 2u + 8 + 64}) {
+    EXPECT_EQ(reported(good), 0) << good;
+  }
+  for (const std::uint32_t bad : {8u, 16u, 32u, 64u, 2u + 8 + 32, 2u + 16 + 64}) {
+    EXPECT_EQ(reported(bad), 1) << bad;
+  }
+}
+
 TEST(Issues, IdsAndFilesAndCasesAreTheSameSet) {
   std::set<std::string> ids;
   for (const IssueKind& kind : issue_kinds()) EXPECT_TRUE(ids.insert(kind.id).second) << kind.id;
