@@ -35,6 +35,20 @@ TEST(Ciede2000, GivesThePublishedDifferences) {
   }
 }
 
+// Pure red and blue of sRGB are 52.88 apart by CIEDE2000, and 176.3 by CIE 1976.
+TEST(ColourDifference, PicturesAreComparedByCiede2000WhereBothShowSomething) {
+  RgbaImage red{4, 4, {}};
+  RgbaImage blue{4, 4, {}};
+  for (int i = 0; i < 16; ++i) {
+    red.pixels.insert(red.pixels.end(), {255, 0, 0, 255});
+    blue.pixels.insert(blue.pixels.end(), {0, 0, 255, 255});
+  }
+  const std::array<std::uint8_t, 3> clear{128, 128, 128};
+  EXPECT_NEAR(mean_delta_e(red, blue, clear), 52.88, 0.01);
+  std::fill_n(blue.pixels.begin(), 3, std::uint8_t{128});  // nothing there
+  EXPECT_NEAR(mean_delta_e(red, blue, clear), 52.88, 0.01);
+}
+
 /// A level square of that side over the ground's middle.
 TriMesh plate(double height, float opacity) {
   TriMesh mesh;

@@ -313,11 +313,29 @@ double ciede2000(const glm::dvec3& a, const glm::dvec3& b) {
 
 double mean_delta_e(const RgbaImage& a, const RgbaImage& b,
                     const std::array<std::uint8_t, 3>& clear) {
+  // In w, whether both show something there.
+  std::vector<std::array<glm::dvec4, 2>> colours(a.pixels.size() / 4);
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    const std::uint8_t* const p = &a.pixels[4 * i];
+    const std::uint8_t* const q = &b.pixels[4 * i];
+    if (is_clear(p, clear) || is_clear(q, clear)) continue;
+    colours[i] = {glm::dvec4(lab_of(p), 1), glm::dvec4(lab_of(q), 1)};
+  }
   double sum = 0;
   std::size_t count = 0;
-  for (std::size_t i = 0; i < a.pixels.size(); i += 4) {
-    if (is_clear(&a.pixels[i], clear) || is_clear(&b.pixels[i], clear)) continue;
-    sum += glm::length(lab_of(&a.pixels[i]) - lab_of(&b.pixels[i]));
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    if (colours[i][0].w == 0) continue;
+    std::array<glm::dvec4, 2> means{};
+    const std::size_t x = i % a.width;
+    const std::size_t y = i / a.width;
+    for (std::size_t v = std::max<std::size_t>(y, 1) - 1; v < std::min(y + 2, a.height + 0UL);
+         ++v) {
+      for (std::size_t u = std::max<std::size_t>(x, 1) - 1; u < std::min(x + 2, a.width + 0UL);
+           ++u) {
+        for (std::size_t k = 0; k < 2; ++k) means[k] += colours[v * a.width + u][k];
+      }
+    }
+    sum += ciede2000(glm::dvec3(means[0]) / means[0].w, glm::dvec3(means[1]) / means[1].w);
     ++count;
   }
   return count == 0 ? 0.0 : sum / static_cast<double>(count);

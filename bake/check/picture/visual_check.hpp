@@ -36,7 +36,7 @@ struct ModelLook {
   bool judged = false;  ///< false: it is translucent, which the reference does not draw
   double ssim_mean = 1;
   double ssim_worst = 1;
-  double delta_e_mean = 0;   ///< CIE 1976, mean over the model's pixels, then over the views
+  double delta_e_mean = 0;   ///< see mean_delta_e(); mean over the views
   double delta_e_worst = 0;  ///< of the worst view
   int worst_view = 0;
   std::string picture;            ///< source and bundle side by side; empty: not written
@@ -50,8 +50,9 @@ glm::dvec3 lab_of(const std::uint8_t* pixel);
 /// 2005.
 double ciede2000(const glm::dvec3& a, const glm::dvec3& b);
 
-/// Mean CIE 1976 colour difference over the pixels where both images differ from `clear`; 0 if
-/// none: outlines are for SSIM to judge. Images of one size, sRGB.
+/// Mean CIEDE2000 over the pixels where both images differ from `clear`; 0 if none: outlines are
+/// for SSIM to judge. Each pixel is the mean of 3 x 3: nobody sees where within two pixels an edge
+/// is. Images of one size, sRGB.
 double mean_delta_e(const RgbaImage& a, const RgbaImage& b,
                     const std::array<std::uint8_t, 3>& clear);
 
