@@ -55,7 +55,7 @@ uniform vec4 u_specular;
 uniform vec4 u_emission;
 // Of the reflection: factors on the linear and quadratic parts of the sky, the share straight on and the increase at a grazing angle.
 uniform vec4 u_mirror;
-// The mean colour that light is multiplied with, linear: a highlight is added to it.
+// The mean colour that light is multiplied with, linear: a highlight is added to it, by the share in w.
 uniform vec4 u_albedo;
 varying vec3 v_shine;
 #endif
@@ -155,8 +155,9 @@ void main() {
   float e = 1.0 - abs(dot(n, ray));
   added += mirrored * (u_mirror.z + u_mirror.w * e * e * e * e * e);
   vec3 halfway = normalize(u_key.xyz - ray);
-  added += u_specular.rgb * pow(max(dot(n, halfway), 0.0001), u_specular.w);
-  light = mix(light, mirrored, u_emission.w);
+  vec3 shine = u_specular.rgb * pow(max(dot(n, halfway), 0.0001), u_specular.w);
+  added += u_albedo.w * shine;
+  light = mix(light, mirrored + shine, u_emission.w);
 #endif
   vec3 lit = u_albedo.rgb * light;
 #ifdef COLOURED

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "formats/base/colour.hpp"
+#include "modar/renderer.hpp"
 
 namespace modar {
 namespace {
@@ -12,7 +13,7 @@ namespace {
 /// Reflection of white below which highlights are invisible. Higher drops visible highlights, lower
 /// costs phones time.
 constexpr double kFaint = 0.05;
-/// Luminance below which a surface is seen by what it mirrors: less than dielectrics reflect.
+/// Channel below which a surface is seen by what it mirrors: less than dielectrics reflect.
 constexpr double kDark = kDielectricReflectance;
 /// Less metal takes less than a tenth of the colour away, 4 % of its stored value.
 constexpr double kSomeMetal = 0.1;
@@ -24,14 +25,18 @@ void set_reflection(double roughness, double metalness, const glm::dvec3& base, 
   roughness = std::clamp(roughness, 0.05, 1.0);
   metalness = std::clamp(metalness, 0.0, 1.0);
   const double exponent = std::min(1000.0, 2.0 / std::pow(roughness, 4) - 2.0);
+  // Of metal, before its colour; fainter where the drawn one is wider.
+  const double drawn = std::min(exponent, static_cast<double>(kMostShininess));
+  const double highlight = (drawn + 2) / 8 * (drawn / std::max(exponent, 1.0));
   double brightest = 0;
   for (int i = 0; i < 3; ++i) {
     const double straight = kDielectricReflectance + metalness * (base[i] - kDielectricReflectance);
     const double middle = std::clamp(straight * (exponent + 2) / 8, 0.0, 1.0);
-    material.specular[i] = static_cast<float>(srgb_of_linear(middle));
+    material.specular[i] = static_cast<float>(srgb_of_linear(metalness > 0 ? highlight : middle));
     brightest = std::max(brightest, middle);
   }
-  const bool dark = !pictured && luminance(base.r, base.g, base.b) < kDark;
+  // Pictures have dark places.
+  const bool dark = pictured ? metalness < kSomeMetal : std::min({base.r, base.g, base.b}) < kDark;
   // Rougher metal spreads its light as wide as what scatters it; so do files that state nothing,
   // which glTF calls metal of roughness 1.
   const bool shows = (exponent >= 1 && (brightest >= kFaint || metalness >= kSomeMetal)) || dark;

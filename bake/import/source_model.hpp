@@ -46,7 +46,7 @@ struct SourceMaterial {
   std::string name;
   glm::vec3 ambient{0.2f};
   glm::vec3 diffuse{kClay};
-  glm::vec3 specular{0.0f};
+  glm::vec3 specular{0.0f};  ///< where there is metalness, before its colour
   glm::vec3 emission{0.0f};
   float shininess = 0.0f;
   float reflectance = 0.0f;  ///< part of the light that it mirrors straight on, 0 to 1

@@ -43,10 +43,13 @@ glm::vec4 mirror_factors(float shininess, float reflectance, float metalness) {
   // this rough mirror wider lobes towards their normal.
   const float n = std::max(shininess, 4.0f);
   const float roughness = std::sqrt(std::sqrt(2.0f / (shininess + 2.0f)));
-  const float share = reflectance * (1.0f - metalness);
-  return {
-      1.5f * (n + 4.0f) / (n + 8.0f), 4.0f * n / (n + 12.0f), share,
-      std::max(1.0f - roughness - share, 0.0f) * (reflectance > 0.0f ? 1.0f - metalness : 0.0f)};
+  // Rough surfaces mirror less: fits of Karis' approximation ("Physically Based Shading on Mobile",
+  // 2014) straight on and at a grazing angle.
+  const float smooth = 1.0f - roughness;
+  const float dielectric = reflectance > 0.0f ? 1.0f - metalness : 0.0f;
+  return {1.5f * (n + 4.0f) / (n + 8.0f), 4.0f * n / (n + 12.0f),
+          reflectance * dielectric * (0.45f + 0.55f * smooth),
+          dielectric * smooth * smooth * smooth};
 }
 
 RoomLight light_of_record(const LightRecord& record) {

@@ -265,17 +265,16 @@ void ModelPainter::set_material(const PaintJob& job, ProgramState& state, const 
   set_vector(program.diffuse, stored_colour(record.diffuse, two_sided ? 1.0f : 0.0f), job.stats);
   if (program.key.shiny) {
     const bool shining = shines(record);
-    const glm::vec4 key = lights_.key_colour(piece.light);
-    glm::vec4 specular = linear_colour(record.specular, shining ? 1.0f : 0.0f, 0.0f) * key;
+    const float metalness = material_share(record.flags, kMaterialMetalness);
+    glm::vec4 specular = linear_colour(record.specular, shining ? 1.0f : 0.0f, 0.0f) *
+                         lights_.key_colour(piece.light);
     specular.w = shining ? std::min(record.shininess, kMostShininess) : 1.0f;
     set_vector(program.specular, specular, job.stats);
-    const float metalness = material_share(record.flags, kMaterialMetalness);
     set_vector(program.emission, linear_colour(record.emission, 1.0f, metalness), job.stats);
-    set_vector(program.mirror,
-               mirror_factors(record.shininess, material_share(record.flags, kMaterialReflectance),
-                              metalness),
-               job.stats);
+    const float reflectance = material_share(record.flags, kMaterialReflectance);
+    set_vector(program.mirror, mirror_factors(record.shininess, reflectance, metalness), job.stats);
     glm::vec4 albedo = linear_colour(record.diffuse, 1.0f, 0.0f);
+    albedo.w = metalness > 0.0f ? reflectance * (1.0f - metalness) : 1.0f;
     if (program.key.textured) {
       const Rgb8 mean = job.textures.mean(record.texture);
       for (int c = 0; c < 3; ++c)

@@ -289,7 +289,7 @@ TEST_F(Gltf, GlassAndGlossinessHaveTheCoresNearest) {
           R"("nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}],)"
           R"("images":[{"uri":"data:image/png;base64,iVBORw0KGgo="}],"textures":[{"source":0}],)"
           R"("materials":[)" +
-          gloss + R"("diffuseFactor":[0.5,0,0,0.25],"specularFactor":[0.04,0.04,0.04],)" +
+          gloss + R"("diffuseFactor":[0.5,0.25,0.25,0.25],"specularFactor":[0.04,0.04,0.04],)" +
           R"("glossinessFactor":0}},"alphaMode":"BLEND"},)" + gloss +
           R"("diffuseFactor":[0,0,0,1],"specularFactor":[1,0.2140411,0]}}},)" + gloss +
           R"("diffuseTexture":{"index":0}}}},)"
@@ -300,13 +300,13 @@ TEST_F(Gltf, GlassAndGlossinessHaveTheCoresNearest) {
   ASSERT_TRUE(model) << to_line(model.error());
   const std::vector<SourceMaterial>& m = model->materials;
   EXPECT_NEAR(m[0].diffuse.r, 0.735, 1e-3);  // sRGB of 0.5
-  EXPECT_EQ(m[0].diffuse.g, 0.0f);
+  EXPECT_NEAR(m[0].diffuse.g, 0.537, 1e-3);
   EXPECT_EQ(m[0].opacity, 0.25f);
   EXPECT_EQ(m[0].specular, glm::vec3(0.0f)) << "rough";
   // Reflects more than it scatters: a metal of that colour.
   EXPECT_EQ(m[1].diffuse.r, 1.0f);
   EXPECT_NEAR(m[1].diffuse.g, 0.5, 1e-3);
-  EXPECT_GT(m[1].specular.r, m[1].specular.b);
+  EXPECT_EQ(m[1].metalness, 1.0f);
   EXPECT_FALSE(m[2].diffuse_map.empty());
   EXPECT_EQ(m[2].diffuse, glm::vec3(1.0f));
   EXPECT_NEAR(m[3].opacity, 0.2, 1e-6);
@@ -452,8 +452,9 @@ TEST_F(Gltf, PicturesAndModesOfAlphaAreFoldedIntoTheColour) {
   EXPECT_TRUE(model->materials[6].diffuse_map.empty());
   EXPECT_GT(model->materials[6].emission.x, 0.7f);
   EXPECT_NEAR(model->materials[6].shininess, 76.1f, 0.1f);
-  EXPECT_FLOAT_EQ(model->materials[6].specular.x, 1.0f);
-  EXPECT_FLOAT_EQ(model->materials[6].specular.z, 0.0f);
+  // (n + 2) / 8 of the drawn exponent, 40, times 40 / 76.1, in sRGB; the colour comes later.
+  EXPECT_NEAR(model->materials[6].specular.x, 1.555f, 0.005f);
+  EXPECT_EQ(model->materials[6].specular.z, model->materials[6].specular.x);
   EXPECT_EQ(model->materials[0].shininess, 0.0f);
   std::vector<std::string> ids;
   for (const Diagnostic& d : model->diagnostics) ids.push_back(d.id);
@@ -461,6 +462,82 @@ TEST_F(Gltf, PicturesAndModesOfAlphaAreFoldedIntoTheColour) {
   EXPECT_EQ(ids,
             (std::vector<std::string>{"gltf.alpha-mask", "gltf.emissive-map", "gltf.emissive-map",
                                       "gltf.metal-map", "gltf.occlusion-map"}));
+}
+
+/// Three triangles, two on the left half of a map and one on the right one.
+std::string three_triangles() {
+  return raw<float>(
+             {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1, 0, 0, 2, 1, 0, 2, 0, 1, 2}) +
+         raw<float>({0.05f, 0.1f, 0.4f, 0.1f, 0.05f, 0.9f, 0.55f, 0.1f, 0.9f, 0.1f, 0.55f, 0.9f,
+                     0.05f, 0.1f, 0.4f, 0.1f, 0.05f, 0.9f});
+}
+
+constexpr const char* kThreeTriangles =
+    R"("bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":108},
+    {"buffer":0,"byteOffset":108,"byteLength":72}],
+    "accessors":[{"bufferView":0,"componentType":5126,"count":9,"type":"VEC3"},
+    {"bufferView":1,"componentType":5126,"count":9,"type":"VEC2"}],
+    "meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1},"material":0}]}],
+    "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}],
+    "images":[{"uri":"metal.png"}],"textures":[{"source":0}],)";
+
+TEST_F(Gltf, PicturesOfWhatIsLitMirrorLightInTheirDarkPlaces) {
+  ASSERT_TRUE(write_png({1, 1, {9, 9, 9, 255}}, (folder_ / "metal.png").string()));
+  const auto model = read(
+      std::string(kThreeTriangles) +
+          R"("materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0},"metallicFactor":0}},
+          {"pbrMetallicRoughness":{"baseColorTexture":{"index":0},"metallicFactor":0},
+           "extensions":{"KHR_materials_unlit":{}}},
+          {"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}])",
+      three_triangles());
+  ASSERT_TRUE(model) << to_line(model.error());
+  EXPECT_FLOAT_EQ(model->materials[0].reflectance, 0.04f) << "glTF 2.0, appendix B";
+  EXPECT_EQ(model->materials[1].reflectance, 0.0f) << "unlit";
+  EXPECT_EQ(model->materials[2].metalness, 0.0f) << "a file that states nothing means no metal";
+}
+
+TEST_F(Gltf, FacesThatAMapCallsMetalAreAMaterialOfTheirOwn) {
+  // Green is roughness, blue metalness: metal of roughness 0.4 on the left, plain 0.8 on the right.
+  const auto map = [&](std::uint8_t right_metal) {
+    RgbaImage image{8, 2, {}};
+    for (int i = 0; i < 16; ++i) {
+      const bool left = i % 8 < 4;
+      image.pixels.insert(image.pixels.end(), {0,
+                                               static_cast<std::uint8_t>(left               ? 102
+                                                                         : right_metal == 0 ? 204
+                                                                                            : 102),
+                                               left ? std::uint8_t{255} : right_metal, 255});
+    }
+    ASSERT_TRUE(write_png(image, (folder_ / "metal.png").string()));
+  };
+  const auto read_with = [&](const char* map_info) {
+    return read(
+        std::string(kThreeTriangles) +
+            R"("materials":[{"name":"m","pbrMetallicRoughness":{"baseColorFactor":[1,0.5,0,1],
+                    "metallicRoughnessTexture":)" +
+            map_info + "}}]",
+        three_triangles());
+  };
+  map(0);
+  const auto two = read_with(R"({"index":0})");
+  ASSERT_TRUE(two) << to_line(two.error());
+  RunCursor runs(two->material_runs);
+  const SourceMaterial& left = two->materials[runs.at(0)];
+  const SourceMaterial& right = two->materials[runs.at(1)];
+  EXPECT_EQ(&left, &two->materials[runs.at(2)]);
+  EXPECT_NE(left.name, right.name);
+  EXPECT_EQ(left.metalness, 1.0f);
+  EXPECT_NEAR(left.shininess, 76.1f, 6.0f);  // 2 / 0.4^4 - 2, in steps of 1/32
+  EXPECT_EQ(right.metalness, 0.0f);
+  map(255);  // all metal of one roughness: nothing to split
+  const auto one = read_with(R"({"index":0})");
+  ASSERT_TRUE(one) << to_line(one.error());
+  EXPECT_EQ(one->materials.size(), 2u);  // and clay
+  map(0);                                // another set of coordinates: the means alone
+  const auto other = read_with(R"({"index":0,"texCoord":1})");
+  ASSERT_TRUE(other) << to_line(other.error());
+  EXPECT_EQ(other->materials.size(), 2u);
+  EXPECT_NEAR(other->materials[0].metalness, 0.5f, 0.01f);
 }
 
 // glTF 2.0, 3.8.2: colour space information of image files is ignored.

@@ -186,14 +186,16 @@ TEST_F(MtlReader, ReflectionFollowsFromWhatTheMaterialStates) {
   const auto m = parse(
       "newmtl matt\nKd 0.5\nnewmtl shiny\nKd 0.5\nKs 0.5\nNs 50\n"
       "newmtl mirror\nKd 0\nKs 1\nNs 50\nillum 3\n"
-      "newmtl brass\nKd 0.9 0.8 0.5\nPr 0.4\nPm 1\nnewmtl chalk\nKd 0.9\nPr 1\nPm 0");
-  ASSERT_EQ(m.size(), 5u);
+      "newmtl brass\nKd 0.9 0.8 0.5\nPr 0.4\nPm 1\nnewmtl chalk\nKd 0.9\nPr 1\nPm 0\n"
+      "newmtl leaf\nKd 0 0.5 0\nPr 1\nPm 0");
+  ASSERT_EQ(m.size(), 6u);
   EXPECT_EQ(m[0].reflectance, 0.0f);
   EXPECT_FLOAT_EQ(m[1].reflectance, 0.04f) << "glTF 2.0, appendix B";
   EXPECT_FLOAT_EQ(m[2].reflectance, 1.0f);
   EXPECT_EQ(m[3].metalness, 1.0f);
   EXPECT_NEAR(m[3].shininess, 76.1f, 0.1f);  // 2 / 0.4^4 - 2
   EXPECT_EQ(m[4].reflectance, 0.0f) << "nothing of it would be seen";
+  EXPECT_FLOAT_EQ(m[5].reflectance, 0.04f) << "it is seen in red and blue";
 }
 
 TEST_F(MtlReader, APictureAloneIsSeenAsItIs) {

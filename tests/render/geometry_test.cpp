@@ -220,21 +220,28 @@ struct Finish {
 
 double seen_along(const RoomLight& light, const glm::dvec3& towards, double shininess, int c);
 
-/// White of that finish: what it scatters, and what it mirrors by Schlick's approximation of
-/// Fresnel's equations, weakened at the edges by its roughness.
+/// The part of the light from around that GGX lobes mirror: Karis, "Physically Based Shading on
+/// Mobile", 2014.
+double mirrored_part(double reflectance, double roughness, double cosine) {
+  const double x = 1 - roughness;
+  const double a = std::min(x * x, std::exp2(-9.28 * cosine)) * x + 0.0425 - 0.0275 * roughness;
+  return reflectance * (1.04 - 0.572 * roughness - 1.04 * a) + 1.04 * a + 0.022 * roughness - 0.04;
+}
+
+/// White of that finish: what it scatters, and what it mirrors.
 std::uint8_t mirroring_channel(const Finish& finish, const RoomLight& light, const glm::dvec3& n,
                                const glm::dvec3& ray, std::size_t c) {
   const auto factor = [](double x) { return 1.05 * std::sqrt(x) - 0.05 * x; };
   const double albedo = std::pow((finish.colour + 0.055) / 1.055, 2.4);
   const double seen =
       std::max(0.0, seen_along(light, glm::reflect(ray, n), finish.shininess, static_cast<int>(c)));
-  const double share = finish.reflectance * (1 - finish.metalness);
-  const double smooth = 1 - std::pow(2 / (finish.shininess + 2), 0.25);
-  const double edge =
-      share > 0 ? (smooth - share) * std::pow(1 - std::abs(glm::dot(n, ray)), 5) : 0.0;
+  const double roughness = std::pow(2 / (finish.shininess + 2), 0.25);
+  const double part = finish.reflectance > 0
+                          ? mirrored_part(finish.reflectance, roughness, std::abs(glm::dot(n, ray)))
+                          : 0.0;
   const double body = glm::mix(light_on(light, n, c), seen, finish.metalness);
-  const double all = finish.colour * factor(body) + factor(albedo * body + seen * (share + edge)) -
-                     factor(albedo * body);
+  const double all =
+      finish.colour * factor(body) + factor(albedo * body + seen * part) - factor(albedo * body);
   return static_cast<std::uint8_t>(std::lround(255 * std::clamp(all, 0.0, 1.0)));
 }
 
@@ -378,6 +385,36 @@ TEST_F(GeometryTest, BlackPlasticAndMetalMirrorTheRoom) {
       expect_lit(*renderer, triangles, *options.light, stretch, 10, &finish);
     }
   }
+}
+
+// Metal reflects by its colour: red metal has a red highlight, not a white one.
+TEST_F(GeometryTest, TheHighlightOfMetalHasTheColourOfItsVertices) {
+  std::vector<Triangle> triangles = tilted_squares(3.0, 0.12);
+  for (Triangle& triangle : triangles) triangle.colour = {200, 0, 0};
+  SceneMaker maker;
+  maker.add_plain_model(Layout::kHalfLit, triangles);
+  MaterialRecord& material = maker.content.materials[0];
+  std::fill_n(material.specular, 3, 1.0f);
+  material.shininess = 2.0f;
+  material.flags |= 0xFFu << 8;
+  const MappedBundle bundle(maker.content);
+  const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
+  ASSERT_TRUE(renderer);
+  RenderOptions options = flat_light();
+  options.light->sky = {};
+  options.light->direction = {0.0f, 0.0f, 1.0f};
+  options.light->key = glm::vec3(1.0f);
+  renderer->set_options(options);
+  glm::dmat4 view = glm::translate(glm::dmat4(1.0), glm::dvec3(0.0, 0.0, -2.5));
+  const DrawItem item{0, glm::mat4(view)};
+  const std::vector<std::uint8_t> pixels = draw(*renderer, small_camera(), {&item, 1});
+  std::uint8_t most_red = 0;
+  for (std::size_t at = 0; at < pixels.size(); at += 4) {
+    if (pixels[at] == pixels[at + 1]) continue;  // nothing drawn
+    most_red = std::max(most_red, pixels[at]);
+    EXPECT_EQ(pixels[at + 1], 0) << at;
+  }
+  EXPECT_GT(most_red, 100);
 }
 
 TEST_F(GeometryTest, MirroredMatricesShowTheSameFrontFaces) {

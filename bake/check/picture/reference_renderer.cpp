@@ -160,9 +160,11 @@ class Canvas {
     const double edge = std::pow(1 - std::min(std::fabs(glm::dot(world, ray)), 1.0), 5.0);
     ShadedVertex lit;
     lit.light = sky(world, 1, 1) + key * std::max(glm::dot(world, to_key), 0.0);
-    lit.light = glm::mix(lit.light, mirrored, static_cast<double>(m.metalness));
-    lit.added = srgb_to_linear(glm::dvec3(m.emission)) +
-                srgb_to_linear(glm::dvec3(m.specular)) * key * shine +
+    const glm::dvec3 highlight = srgb_to_linear(glm::dvec3(m.specular)) * key * shine;
+    const auto metalness = static_cast<double>(m.metalness);
+    const double share = metalness > 0 ? static_cast<double>(m.reflectance) * (1 - metalness) : 1.0;
+    lit.light = glm::mix(lit.light, mirrored + highlight, metalness);
+    lit.added = srgb_to_linear(glm::dvec3(m.emission)) + share * highlight +
                 mirrored * (factors.z + factors.w * edge);
     lit.diffuse = glm::dvec3(m.diffuse);
     if (!mesh_.uvs.empty()) lit.uv = mesh_.uvs[v];

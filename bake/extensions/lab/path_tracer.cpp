@@ -373,7 +373,8 @@ class PathTracer::Scene {
     glm::dvec3 given = s.albedo * (cosine * (1 - s.metalness));
     if (first && s.shininess > 0) {
       const glm::dvec3 halfway = glm::normalize(to_light - direction);
-      given += s.specular * std::pow(std::max(glm::dot(s.normal, halfway), 0.0), s.shininess);
+      given += glm::mix(glm::dvec3(1.0), s.albedo, s.metalness) * s.specular *
+               std::pow(std::max(glm::dot(s.normal, halfway), 0.0), s.shininess);
     }
     return given * key_;
   }

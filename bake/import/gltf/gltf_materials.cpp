@@ -203,7 +203,7 @@ class MaterialReader {
       m.emission[i] = channel(source.emissiveFactor, i, 0.0);
     }
     m.two_sided = source.doubleSided;
-    set_reflection_of(pbr, m);
+    set_reflection_of(source, m);
     set_pictures(source, m);
     m.beyond = beyond(picture_of(source));
     set_normal_map(source, m);
@@ -233,8 +233,6 @@ class MaterialReader {
     add("gltf.normal-map", normals_left_out_,
         "have a normal map with another set of texture coordinates than the base colour, which is "
         "ignored");
-    add("gltf.metal-map", averaged_,
-        "have a metallic-roughness map; its means set the highlight of the whole material");
     add("gltf.glossiness-map",
         static_cast<int>(std::count_if(gltf_.materials.begin(), gltf_.materials.end(),
                                        [](const tinygltf::Material& material) {
@@ -247,31 +245,29 @@ class MaterialReader {
         "are cut out at an alpha value: lower values are transparent, the others opaque");
   }
 
+  [[nodiscard]] const std::vector<MetalMap>& metal_maps() const { return metal_maps_; }
+
  private:
   struct Count {
     int folded = 0;
     int left_out = 0;
   };
 
-  void set_reflection_of(const tinygltf::PbrMetallicRoughness& pbr, SourceMaterial& m) {
-    double roughness = pbr.roughnessFactor;
-    double metalness = pbr.metallicFactor;
-    if (const std::string map = image_path(pbr.metallicRoughnessTexture.index); !map.empty()) {
-      const auto [found, added] = means_.try_emplace(map);
-      if (added) {
-        if (const auto means = mean_roughness_metalness(map)) {
-          found->second = *means;
-        } else {
-          note(means.error());
-        }
-      }
-      roughness *= found->second.roughness;
-      metalness *= found->second.metalness;
-      ++averaged_;
+  void set_reflection_of(const tinygltf::Material& source, SourceMaterial& m) {
+    const std::uint32_t number = count_++;
+    if (source.extensions.count("KHR_materials_unlit") != 0) return;
+    const auto& pbr = source.pbrMetallicRoughness;
+    MetalMap map{number, image_path(pbr.metallicRoughnessTexture.index), pbr.roughnessFactor,
+                 pbr.metallicFactor};
+    for (int i = 0; i < 3; ++i) map.base[i] = factor(pbr.baseColorFactor, std::size_t(i), 1.0);
+    map.pictured = pbr.baseColorTexture.index >= 0;
+    map.on_its_uvs = pbr.metallicRoughnessTexture.texCoord == pbr.baseColorTexture.texCoord &&
+                     pbr.metallicRoughnessTexture.extensions == pbr.baseColorTexture.extensions;
+    if (map.path.empty()) {
+      set_reflection(map.roughness, map.metalness, map.base, map.pictured, m);
+    } else {
+      metal_maps_.push_back(map);
     }
-    glm::dvec3 base(0.0);
-    for (int i = 0; i < 3; ++i) base[i] = factor(pbr.baseColorFactor, std::size_t(i), 1.0);
-    set_reflection(roughness, metalness, base, pbr.baseColorTexture.index >= 0, m);
   }
 
   void set_pictures(const tinygltf::Material& source, SourceMaterial& m) {
@@ -464,11 +460,11 @@ class MaterialReader {
   std::vector<std::optional<std::string>> paths_;
   std::shared_ptr<TemporaryFolder> folder_of_images_;
   std::map<GltfPictures, std::string> folded_;
-  std::map<std::string, RoughnessMetalness> means_;  ///< by path: 1 where it cannot be read
+  std::vector<MetalMap> metal_maps_;
+  std::uint32_t count_ = 0;
   Count emissive_;
   Count occlusion_;
   int normals_left_out_ = 0;
-  int averaged_ = 0;
   int cut_out_ = 0;
 };
 
@@ -490,12 +486,14 @@ bool keep_image_bytes(tinygltf::Image* image, int, std::string*, std::string*, i
 
 std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const ModelFolder& folder,
                                            const std::string& label,
-                                           std::vector<Diagnostic>& diagnostics) {
+                                           std::vector<Diagnostic>& diagnostics,
+                                           std::vector<MetalMap>& metal_maps) {
   MaterialReader reader(gltf, folder, label, diagnostics);
   std::vector<SourceMaterial> materials;
   for (const tinygltf::Material& m : gltf.materials) materials.push_back(reader.read(m));
   materials.emplace_back();
   reader.report();
+  metal_maps = reader.metal_maps();
   return materials;
 }
 

@@ -6,6 +6,7 @@
 
 #include <glm/vec2.hpp>
 
+#include "bake/import/gltf/gltf_metal_maps.hpp"
 #include "bake/import/read_model.hpp"
 
 namespace tinygltf {
@@ -27,10 +28,11 @@ void use_metallic_roughness(tinygltf::Model& gltf);
 /// emission, occlusion, roughness, metalness and the modes of alpha as far as our shader has them.
 /// Findings state merged and omitted parts.
 /// folder: where image names are looked up, with a trailing slash. label: the file's name in
-/// diagnostics.
+/// diagnostics. metal_maps: those that apply_metal_maps() is yet to apply.
 std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const ModelFolder& folder,
                                            const std::string& label,
-                                           std::vector<Diagnostic>& diagnostics);
+                                           std::vector<Diagnostic>& diagnostics,
+                                           std::vector<MetalMap>& metal_maps);
 
 /// KHR_texture_transform of the base colour: uv of the file to those of the image, v down in both.
 struct GltfUv {

@@ -83,15 +83,4 @@ Result<std::optional<RgbaImage>> fold_pictures(const GltfPictures& pictures) {
   return image;
 }
 
-Result<RoughnessMetalness> mean_roughness_metalness(const std::string& path) {
-  MODAR_ASSIGN(const RgbaImage image, read_image(path));
-  std::array<std::uint64_t, 2> sums{};
-  for (std::size_t p = 0; p < image.pixels.size(); p += 4) {
-    sums[0] += image.pixels[p + 1];
-    sums[1] += image.pixels[p + 2];
-  }
-  const double all = 255.0 * static_cast<double>(image.pixels.size()) / 4;
-  return RoughnessMetalness{static_cast<double>(sums[0]) / all, static_cast<double>(sums[1]) / all};
-}
-
 }  // namespace modar

@@ -38,14 +38,6 @@ struct GltfPictures {
 /// as asked. Nothing if the colour can be drawn unchanged. Errors: as read_image().
 Result<std::optional<RgbaImage>> fold_pictures(const GltfPictures& pictures);
 
-/// Means over a picture of stored green and blue: roughness and metalness, in [0,1].
-/// Errors: as read_image().
-struct RoughnessMetalness {
-  double roughness = 1;
-  double metalness = 1;
-};
-Result<RoughnessMetalness> mean_roughness_metalness(const std::string& path);
-
 /// Linear light to sRGB (IEC 61966-2-1), both in [0,1].
 double stored_light(double linear);
 

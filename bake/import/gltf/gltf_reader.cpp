@@ -519,9 +519,11 @@ Result<SourceModel> read_gltf(const std::string& path, const ReadOptions& option
   for (const tinygltf::Buffer& buffer : gltf.buffers) note_file(buffer.uri);
   for (const tinygltf::Image& image : gltf.images) note_file(image.uri);
   use_metallic_roughness(gltf);
-  model.materials = gltf_materials(gltf, place, path, model.diagnostics);
+  std::vector<MetalMap> metal_maps;
+  model.materials = gltf_materials(gltf, place, path, model.diagnostics, metal_maps);
   SceneReader scene(gltf, model, path);
   MODAR_TRY(scene.run());
+  apply_metal_maps(metal_maps, path, model);
   report_left_out(gltf, scene.left_out(), path, model.diagnostics);
   if (model.corner_positions.empty()) {
     return fail(ExitCode::kInvalidInput, "gltf.no-faces", path, "it contains no triangles",
