@@ -30,6 +30,7 @@
 #include "bake/texture/relief/relief.hpp"
 #include "bake/texture/texture_stage.hpp"
 #include "formats/base/path.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/content_summary.hpp"
 #include "formats/field_table.hpp"
@@ -56,7 +57,7 @@ std::uint32_t layout_index(const LayoutRecord& layout, BundleContent& content) {
 /// Models of one layout are baked alike: all of them have occlusion, or none.
 void add_occlusion(std::uint32_t layout, std::uint32_t byte, BundleContent& content) {
   if (byte == kNone) return;
-  const auto place = std::ranges::find_if(
+  const auto place = ranges::find_if(
       content.occlusion, [&](const OcclusionRecord& other) { return other.layout >= layout; });
   if (place != content.occlusion.end() && place->layout == layout) return;
   content.occlusion.insert(place, {layout, byte});
@@ -417,7 +418,7 @@ Result<void> add_models(const BakeRequest& request, const std::vector<KnownScene
 /// Those that the request asks for.
 void add_parameter_sets(const BakeRequest& request, BundleContent& content) {
   for (const std::string& name : stored_parameters(request)) {
-    ParameterSetRecord set = *std::ranges::find_if(paper_parameter_sets(), [&](const auto& each) {
+    ParameterSetRecord set = *ranges::find_if(paper_parameter_sets(), [&](const auto& each) {
       return name == parameter_set_name(each.id);
     });
     set.name = content.intern(name);

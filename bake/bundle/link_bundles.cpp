@@ -6,6 +6,7 @@
 #include "bake/bundle/bundle_json.hpp"
 #include "bake/bundle/scene/scene_nodes.hpp"
 #include "bake/bundle/scene/scene_placement.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
@@ -59,7 +60,7 @@ class Linker {
       MODAR_ASSIGN(scene, resolve_scene(scene, content_, pattern, model));
       content_.scenes.push_back(place_scene(scene, content_, pattern, model));
     }
-    std::ranges::sort(content_.occlusion, {}, &OcclusionRecord::layout);
+    ranges::sort(content_.occlusion, {}, &OcclusionRecord::layout);
     Report quiet;
     MODAR_TRY(add_nodes(resolved, content_, quiet, media));
     MODAR_TRY(light_scenes(resolved.scenes, resolved, content_, quiet));
@@ -74,7 +75,7 @@ class Linker {
  private:
   static Result<std::uint32_t> find(std::span<const LinkPart> parts, const std::string& name,
                                     const std::string& what) {
-    const auto found = std::ranges::find(parts, name, &LinkPart::name);
+    const auto found = ranges::find(parts, name, &LinkPart::name);
     if (found != parts.end()) return static_cast<std::uint32_t>(found - parts.begin());
     return fail(ExitCode::kUsage, "bake.scene-unknown", name,
                 "the scene names a " + what + " that is not baked", "name one that is");
@@ -85,7 +86,7 @@ class Linker {
     std::vector<std::uint32_t> indices;
     for (std::uint32_t t = 0; t < part.textures().size(); ++t) {
       const std::span<const std::byte> data = part.texture_data(t);
-      const auto same = std::ranges::find_if(content_.textures, [&](const TextureRecord& other) {
+      const auto same = ranges::find_if(content_.textures, [&](const TextureRecord& other) {
         const auto& bytes =
             content_.texture_data[static_cast<std::size_t>(&other - content_.textures.data())];
         const TextureRecord& mine = part.textures()[t];

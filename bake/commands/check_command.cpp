@@ -11,6 +11,7 @@
 #include "bake/check/verdict.hpp"
 #include "bake/io/input.hpp"
 #include "bake/io/terminal.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/device_profile.hpp"
 #include "modar/mapped_file.hpp"
@@ -21,7 +22,7 @@ namespace {
 /// " (byte 19600)" of the file's faults; what a device lacks is not at a place in it.
 std::string place_of(const Issue& issue) {
   const auto kinds = workstation_issue_kinds();
-  const bool of_file = std::ranges::none_of(kinds, [&](const auto& k) { return &k == issue.kind; });
+  const bool of_file = ranges::none_of(kinds, [&](const auto& k) { return &k == issue.kind; });
   return of_file ? " (byte " + std::to_string(issue.offset) + ")" : "";
 }
 

@@ -58,8 +58,8 @@ enum class Shown { kAlways, kInFull };
 /// A command with its options and subcommands. Variables must live until parse_and_run() returns.
 class CommandLine {
  public:
-  using Value =
-      std::variant<std::string*, std::vector<std::string>*, double*, int*, unsigned*, std::size_t*>;
+  using Value = std::variant<std::string*, std::vector<std::string>*, double*, int*, unsigned*,
+                             std::uint64_t*>;
 
   /// The program itself. version: what --version prints, its name and number ("modar 1.0.0").
   CommandLine(const std::string& about, const std::string& version);

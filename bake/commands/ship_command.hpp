@@ -72,7 +72,7 @@ struct ListCommand {
 
 struct PruneCommand {
   std::string folder;
-  std::size_t keep = 2;
+  std::uint64_t keep = 2;
   bool json = false;
 };
 

@@ -4,8 +4,8 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <string>
 #include <string_view>
@@ -22,9 +22,8 @@ namespace {
 void append(std::string& text, double number) {
   // Six digits: of a model of a metre, a micrometre.
   char digits[32];
-  const auto end =
-      std::to_chars(digits, digits + sizeof digits, number, std::chars_format::general, 6);
-  text.append(digits, end.ptr);
+  std::snprintf(digits, sizeof digits, "%.6g", number);
+  text += digits;
 }
 
 template <class Vector>
@@ -75,7 +74,7 @@ void put_header(std::vector<std::byte>& out, const Entry& entry, std::size_t pad
 }
 
 void put_text(std::vector<std::byte>& out, std::string_view text) {
-  const auto bytes = std::as_bytes(std::span(text));
+  const auto bytes = std::as_bytes(std::span(text.data(), text.size()));
   out.insert(out.end(), bytes.begin(), bytes.end());
 }
 

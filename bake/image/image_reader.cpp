@@ -7,6 +7,7 @@
 
 #include "bake/image/decoders.hpp"
 #include "bake/io/input.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/base/utf8.hpp"
 
 namespace modar {
@@ -229,7 +230,7 @@ bool states_other_colours(const std::string& path) {
   const auto file = read_file(path, kMaxFileBytes);
   constexpr std::array kSigns = {"iCCP"sv, "gAMA"sv, "cHRM"sv, "ICC_PROFILE"sv, "ICCP"sv};
   const auto is_there = [&](std::string_view sign) { return file->find(sign) < kMaxProfileAt; };
-  if (!file || std::ranges::none_of(kSigns, is_there)) return false;
+  if (!file || ranges::none_of(kSigns, is_there)) return false;
   auto stored = decode_stored(std::as_bytes(std::span(*file)), path);
   return stored && convert_to_srgb(stored->colours, stored->image);
 }

@@ -11,6 +11,7 @@
 #include "bake/image/decoders.hpp"
 #include "bake/io/input.hpp"
 #include "formats/base/atomic_file.hpp"
+#include "formats/base/ranges.hpp"
 
 namespace modar {
 namespace {
@@ -54,7 +55,7 @@ void on_flush(png_structp) {}
 /// Pixels per metre that programs store without being asked: those of 72, 96 and 144 per inch.
 bool is_default(std::uint32_t per_metre) {
   constexpr std::uint32_t kDefaults[] = {2834, 2835, 3779, 3780, 5669, 5670};
-  return std::ranges::find(kDefaults, per_metre) != std::end(kDefaults);
+  return ranges::find(kDefaults, per_metre) != std::end(kDefaults);
 }
 
 class PngReader {

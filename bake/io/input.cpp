@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "formats/base/path.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/base/utf8.hpp"
 
 namespace modar {
@@ -73,7 +74,7 @@ Result<void> require_kind(FileKind wanted, std::string_view start, const std::st
     return fail(ExitCode::kInvalidInput, "io.empty", path, "the file is empty",
                 "make it again, or copy it again");
   }
-  const auto* found = std::ranges::find_if(kSignatures, [&](const Signature& one) {
+  const auto* found = ranges::find_if(kSignatures, [&](const Signature& one) {
     return start.size() > one.at && start.substr(one.at).starts_with(one.bytes);
   });
   const bool known = found != std::end(kSignatures);

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "bake/json.hpp"
+#include "formats/base/ranges.hpp"
 
 namespace modar {
 
@@ -162,7 +163,7 @@ void print_losses(const std::vector<Diagnostic>& findings) {
     constexpr std::array<std::string_view, 4> kEnds = {"missing-map", "missing-image",
                                                        "missing-texture", "missing-mtl"};
     const bool lost = d.id == "model.lost" || d.id.starts_with("image.") ||
-                      std::ranges::any_of(kEnds, [&](auto end) { return d.id.ends_with(end); });
+                      ranges::any_of(kEnds, [&](auto end) { return d.id.ends_with(end); });
     if (!lost || d.severity == DiagnosticSeverity::kInfo) continue;
     const std::string what = d.id.starts_with("image.") ? "'" + d.file + "': " : "";
     if (!said.insert(what + d.message).second) continue;

@@ -7,6 +7,7 @@
 
 #include "bake/options/request_text.hpp"
 #include "formats/base/path.hpp"
+#include "formats/base/ranges.hpp"
 #include "modar/device_profile.hpp"
 #include "modar/features.hpp"
 
@@ -382,7 +383,7 @@ std::vector<std::string> stored_parameters(const BakeRequest& request) {
     const auto named = [&](const std::string& word) {
       return word == "all" || word == parameter_set_name(set.id);
     };
-    if (std::ranges::any_of(asked, named)) stored.emplace_back(parameter_set_name(set.id));
+    if (ranges::any_of(asked, named)) stored.emplace_back(parameter_set_name(set.id));
   }
   return stored;
 }

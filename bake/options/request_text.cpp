@@ -1,7 +1,6 @@
 #include "bake/options/request_text.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -11,6 +10,8 @@
 #include <tuple>
 #include <utility>
 #include <vector>
+
+#include <fast_float/fast_float.h>
 
 #include "formats/base/address.hpp"
 
@@ -29,7 +30,7 @@ std::vector<std::string_view> split(std::string_view text, char separator) {
 
 bool parse_number(std::string_view text, double& value) {
   const char* last = text.data() + text.size();
-  const auto [end, error] = std::from_chars(text.data(), last, value);
+  const auto [end, error] = fast_float::from_chars(text.data(), last, value);
   return error == std::errc() && end == last && std::isfinite(value);
 }
 

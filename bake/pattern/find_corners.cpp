@@ -8,6 +8,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "formats/base/ranges.hpp"
+
 namespace modar {
 namespace {
 
@@ -166,7 +168,7 @@ std::vector<Line> join_segments(std::vector<cv::Vec4f> segments) {
       lines.push_back({(from + to) / 2, along, long_as, {}, 0});
     }
   }
-  std::ranges::sort(lines, std::greater(), &Line::length);
+  ranges::sort(lines, std::greater(), &Line::length);
   if (lines.size() > kMostLines) lines.resize(kMostLines);
   return lines;
 }
@@ -211,8 +213,9 @@ std::array<Point, 4> clockwise(std::array<Point, 4> corners) {
   if (cross(corners[1] - corners[0], corners[2] - corners[1]) < 0) {
     std::swap(corners[1], corners[3]);
   }
-  const auto first = std::ranges::min_element(
-      corners, [](const Point& a, const Point& b) { return a.x + a.y < b.x + b.y; });
+  const auto first =
+      std::min_element(corners.begin(), corners.end(),
+                       [](const Point& a, const Point& b) { return a.x + a.y < b.x + b.y; });
   std::rotate(corners.begin(), first, corners.end());
   return corners;
 }
@@ -316,7 +319,7 @@ class Foreground {
   /// In the light or in a shadow.
   [[nodiscard]] bool is_ground(const cv::Vec3b& c) const {
     constexpr double kShades[] = {1.0, 1.15, 1.35, 1.6, 2.0};
-    return std::ranges::any_of(kShades, [&](double lit) {
+    return ranges::any_of(kShades, [&](double lit) {
       return ground_[bin(lit * c[0], lit * c[1], lit * c[2])] >= least_;
     });
   }
@@ -328,7 +331,7 @@ class Foreground {
     const int parts = cv::connectedComponentsWithStats(rest, labels, stats, centres, 4);
     std::vector<std::pair<int, int>> areas;  // with their labels
     for (int i = 1; i < parts; ++i) areas.emplace_back(stats.at<int>(i, cv::CC_STAT_AREA), i);
-    std::ranges::sort(areas, std::greater());
+    ranges::sort(areas, std::greater());
     if (areas.empty()) return;
     mask_ = labels == areas[0].second;
     rival_ = areas.size() > 1 ? 1.0 * areas[1].first / areas[0].first : 0;
@@ -400,7 +403,7 @@ class Search {
         }
       }
     }
-    std::ranges::sort(found_, std::greater(), &Figure::score);
+    ranges::sort(found_, std::greater(), &Figure::score);
     return std::move(found_);
   }
 
@@ -937,9 +940,8 @@ bool has_camera_shape(double width, double height) {
   constexpr double kLeastPixels = 640;
   constexpr double kShapes[] = {4.0 / 3, 3.0 / 2, 16.0 / 9};
   const double shape = std::max(width, height) / std::min(width, height);
-  return std::max(width, height) >= kLeastPixels && std::ranges::any_of(kShapes, [&](double one) {
-           return std::fabs(shape / one - 1) < 0.005;
-         });
+  return std::max(width, height) >= kLeastPixels &&
+         ranges::any_of(kShapes, [&](double one) { return std::fabs(shape / one - 1) < 0.005; });
 }
 
 }  // namespace

@@ -32,8 +32,9 @@ Result<void> add_score(const std::string& path, const GrayImage& gray, unsigned 
   out.record.score = static_cast<float>(score.score);
   out.record.score_version = kScoreVersion;
   out.range = score.range;
-  const auto worst = std::ranges::min_element(
-      score.causes, [](const ScoreCause& a, const ScoreCause& b) { return a.value < b.value; });
+  const auto worst =
+      std::min_element(score.causes.begin(), score.causes.end(),
+                       [](const ScoreCause& a, const ScoreCause& b) { return a.value < b.value; });
   const std::string advice =
       *worst->advice == 0 ? "" : std::string(worst->id) + ": " + worst->advice;
   const bool weak = score.grade >= kWeakGrade;

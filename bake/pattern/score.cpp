@@ -586,8 +586,9 @@ void advise(const char* const (&advices)[9], PatternScore& score) {
   const bool advised = std::any_of(score.causes.begin(), score.causes.end(),
                                    [](const ScoreCause& one) { return *one.advice != 0; });
   if (advised) return;
-  const auto worst = std::ranges::min_element(
-      score.causes, [](const ScoreCause& a, const ScoreCause& b) { return a.value < b.value; });
+  const auto worst =
+      std::min_element(score.causes.begin(), score.causes.end(),
+                       [](const ScoreCause& a, const ScoreCause& b) { return a.value < b.value; });
   worst->advice = advices[worst - score.causes.begin()];
 }
 

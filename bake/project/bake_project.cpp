@@ -29,6 +29,7 @@
 #include "formats/base/atomic_file.hpp"
 #include "formats/base/parallel.hpp"
 #include "formats/base/path.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/content_summary.hpp"
 
 namespace modar {
@@ -397,7 +398,7 @@ class ProjectBake {
   /// Does it give a length on a pattern of unknown width? The bake says what cannot be read.
   [[nodiscard]] bool lacks_width(const SceneRequest& scene) const {
     if (!needs_width(scene)) return false;
-    const auto pattern = std::ranges::find(project_.patterns, scene.pattern, &ProjectAsset::name);
+    const auto pattern = ranges::find(project_.patterns, scene.pattern, &ProjectAsset::name);
     if (pattern == project_.patterns.end() || pattern->width_mm > 0) return false;
     const auto shaped = load_shaped(project_.path(pattern->file), 0, pattern->shape);
     return shaped && !(shaped->width_mm > 0);
@@ -416,8 +417,10 @@ class ProjectBake {
                      [&](std::size_t a, std::size_t b) { return sizes[a] > sizes[b]; });
     const double total =
         static_cast<double>(std::accumulate(sizes.begin(), sizes.end(), std::uintmax_t{0}));
-    const auto stale = static_cast<unsigned>(std::ranges::count_if(
-        wanted, [&](std::size_t i) { return tasks_[i].state == AssetOutcome::State::kStale; }));
+    const auto stale =
+        static_cast<unsigned>(std::count_if(wanted.begin(), wanted.end(), [&](std::size_t i) {
+          return tasks_[i].state == AssetOutcome::State::kStale;
+        }));
     const unsigned workers = options_.memory_limited ? 1 : std::clamp(stale, 1U, options_.jobs);
     const unsigned jobs = std::max(1U, options_.jobs / workers);
     const std::string stage =

@@ -15,6 +15,7 @@
 #include "bake/process/process.hpp"
 #include "bake/project/project.hpp"
 #include "formats/base/path.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/base/shortest_number.hpp"
 
 namespace modar {
@@ -161,7 +162,7 @@ std::string tables(const std::string& kind, const std::vector<PatternRequest>& f
   std::string text;
   std::set<std::string> taken;
   for (const auto& [glob, group] : groups) {
-    const bool plain = std::ranges::all_of(group, [&](const PatternRequest& file) {
+    const bool plain = ranges::all_of(group, [&](const PatternRequest& file) {
       return stems[file_stem(file.path)] == 1 && !file.shape.corners;
     });
     if (plain && group.size() > 1) {
@@ -204,7 +205,7 @@ std::optional<Upright> upright_of(const fs::path& path, const std::string& withi
 /// "up = "y"   # the glTF standard", so that one sees what to change.
 std::string up_line(const Found& found, const std::string& model) {
   const auto& models = found.files.models;
-  const auto file = std::ranges::find_if(models, [&](const fs::path& one) {
+  const auto file = ranges::find_if(models, [&](const fs::path& one) {
     std::string name = one.string();
     std::replace(name.begin(), name.end(), '/', '-');
     return one.stem() == model || one.parent_path().filename() == model || name == model;

@@ -6,6 +6,7 @@
 
 #include "bake/project/file_digests.hpp"
 #include "bake/project/toml_scan.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/base/shortest_number.hpp"
 #include "formats/base/utf8.hpp"
 
@@ -184,7 +185,7 @@ class Editor {
 
   [[nodiscard]] static const TomlPair* find_pair(const std::vector<TomlPair>& pairs,
                                                  const Key& key) {
-    const auto found = std::ranges::find(pairs, key, &TomlPair::key);
+    const auto found = ranges::find(pairs, key, &TomlPair::key);
     return found == pairs.end() ? nullptr : &*found;
   }
 
@@ -308,7 +309,7 @@ class Editor {
 
   [[nodiscard]] static std::size_t index_of(const std::vector<TomlPair>& pairs,
                                             const TomlPair& pair) {
-    const auto found = std::ranges::find_if(
+    const auto found = ranges::find_if(
         pairs, [&](const TomlPair& one) { return one.whole.begin == pair.whole.begin; });
     return static_cast<std::size_t>(found - pairs.begin());
   }

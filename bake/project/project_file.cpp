@@ -28,6 +28,7 @@
 #include "bake/project/settings.hpp"
 #include "formats/base/nearest.hpp"
 #include "formats/base/path.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/base/shortest_number.hpp"
 
 namespace modar {
@@ -511,8 +512,8 @@ class ProjectReader {
         asset.file = file;
         asset.name = name.empty() ? file_stem(file) : name;
         if (!seen.insert(asset.name).second) {
-          const bool twice = std::ranges::any_of(
-              assets, [&](const ProjectAsset& one) { return one.file == file; });
+          const bool twice =
+              ranges::any_of(assets, [&](const ProjectAsset& one) { return one.file == file; });
           return fail(ExitCode::kInvalidInput, "project.same-name", reader.at("file"),
                       twice ? file + " is listed twice"
                             : "two files are named '" + asset.name + "', the second is " + file,
@@ -651,7 +652,7 @@ class ProjectReader {
     node.place.pattern = scene.request.pattern;
     MODAR_TRY(parse_node(reader, node.place));
     node.mark =
-        std::to_string(1 + std::ranges::count(scene.nodes, NodeKind::kLabel, &NodeRequest::kind));
+        std::to_string(1 + ranges::count(scene.nodes, NodeKind::kLabel, &NodeRequest::kind));
     MODAR_TRY(reader.take("mark", node.mark));
     if (node.place.name.empty()) node.place.name = node.mark;
     if (node.mark.empty() || node.mark.size() > kMaxMarkBytes ||

@@ -8,6 +8,7 @@
 #include "bake/io/input.hpp"
 #include "bake/io/output.hpp"
 #include "bake/ship/release_folder.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/check.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/release.hpp"
@@ -123,7 +124,7 @@ Result<void> check_bundles(const PublishRequest& request) {
 /// Will there be the bundles whose devices the request names? Errors: kUsage "ship.for".
 Result<void> check_devices(const PublishRequest& request, const std::vector<ReleaseBundle>& kept) {
   for (const auto& [name, devices] : request.devices) {
-    const bool published = std::ranges::any_of(
+    const bool published = ranges::any_of(
         request.bundles,
         [called = name](const std::string& path) { return name_of(path) == called; });
     if (!published && find_bundle(kept, name) == nullptr) {
@@ -150,7 +151,7 @@ std::vector<BundleChange> changes_between(const std::vector<ReleaseBundle>& befo
       changes.push_back({BundleChange::Kind::kDropped, bundle.name});
     }
   }
-  std::ranges::sort(changes, {}, &BundleChange::name);
+  ranges::sort(changes, {}, &BundleChange::name);
   return changes;
 }
 
@@ -248,7 +249,7 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
       if (bundle.name == name) bundle.devices = devices;
     }
   }
-  std::ranges::sort(done.release.bundles, {}, &ReleaseBundle::name);
+  ranges::sort(done.release.bundles, {}, &ReleaseBundle::name);
   done.changes = changes_between(before, done.release.bundles);
   // A document that devices would refuse is not published.
   if (const std::size_t size = release_text(done.release).size(); size > kMaxReleaseBytes) {

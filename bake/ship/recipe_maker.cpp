@@ -9,6 +9,7 @@
 #include "bake/ship/content_pieces.hpp"
 #include "bake/ship/mesh/mesh_pieces.hpp"
 #include "formats/base/parallel.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/transport/feature_text.hpp"
 #include "formats/transport/stages.hpp"
 #include "modar/packed_record.hpp"
@@ -182,7 +183,7 @@ class RecipeMaker {
 
   /// Drafts what no piece covers yet between two offsets.
   void draft_gaps(std::uint64_t begin, std::uint64_t end, Cut cut) {
-    std::ranges::sort(covered_, {}, &Covered::begin);
+    ranges::sort(covered_, {}, &Covered::begin);
     for (const Covered& covered : covered_) {
       if (covered.end <= begin || covered.begin >= end) continue;
       draft_bytes(begin, covered.begin, cut);
@@ -203,7 +204,7 @@ class RecipeMaker {
       draft.record.offset = begin;
       draft.record.raw_size = static_cast<std::uint32_t>(size);
       draft.blocks = cut == Cut::kBlocks;
-      const bool zero = std::ranges::all_of(raw, [](std::byte b) { return b == std::byte{0}; });
+      const bool zero = ranges::all_of(raw, [](std::byte b) { return b == std::byte{0}; });
       if (!zero) drafts_.push_back(std::move(draft));
       begin += size;
     }

@@ -1,9 +1,10 @@
 #include "bake/ship/release_folder.hpp"
 
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
-#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -134,12 +135,9 @@ Result<std::optional<Release>> ReleaseFolder::newest() const {
 }
 
 std::int64_t ReleaseFolder::published(std::uint64_t version) const {
-  std::error_code error;
-  const auto time =
-      fs::last_write_time(path_ + "/releases/" + std::to_string(version) + ".json", error);
-  if (error) return 0;
-  const auto system = std::chrono::file_clock::to_sys(time);
-  return std::chrono::duration_cast<std::chrono::seconds>(system.time_since_epoch()).count();
+  struct stat facts {};
+  const std::string file = path_ + "/releases/" + std::to_string(version) + ".json";
+  return ::stat(file.c_str(), &facts) == 0 ? facts.st_mtime : 0;
 }
 
 Result<RootMetadata> ReleaseFolder::root_metadata() const {
@@ -334,7 +332,7 @@ Result<void> ReleaseFolder::add_key(const PublicKey& next, const SecretKey& key)
   });
 }
 
-Result<std::uint64_t> ReleaseFolder::prune(std::size_t keep) const {
+Result<std::uint64_t> ReleaseFolder::prune(std::uint64_t keep) const {
   std::vector<std::uint64_t> all = versions();
   const std::size_t gone = all.size() > keep ? all.size() - keep : 0;
   std::set<std::string> needed;

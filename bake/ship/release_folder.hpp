@@ -72,7 +72,7 @@ class ReleaseFolder {
   Result<void> add_key(const PublicKey& next, const SecretKey& key) const;
   /// Removes all but the `keep` newest releases, then the objects that no release needs; returns
   /// their bytes.
-  Result<std::uint64_t> prune(std::size_t keep) const;
+  Result<std::uint64_t> prune(std::uint64_t keep) const;
 
  private:
   ReleaseFolder(std::string path, FolderLock lock);

@@ -1,8 +1,8 @@
 // One texture from its file to measured levels of compressed blocks.
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cmath>
+#include <cstdio>
 
 #include "bake/image/difference.hpp"
 #include "bake/image/resample.hpp"
@@ -173,11 +173,11 @@ std::vector<RgbaImage> encode_levels(const RgbaImage& source, const TextureOptio
   return images;
 }
 
-/// A number with two decimals, the same in every locale.
+/// A number with two decimals.
 std::string decimals(double value) {
   char text[32];
-  const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::fixed, 2);
-  return {text, end.ptr};
+  std::snprintf(text, sizeof text, "%.2f", value);
+  return text;
 }
 
 /// The gate: says so where level 0 is worse than asked.

@@ -10,6 +10,7 @@
 #include "bake/options/request_text.hpp"
 #include "bake/pattern/pattern.hpp"
 #include "formats/base/path.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/base/shortest_number.hpp"
 #include "formats/base/utf8.hpp"
 #include "modar/pattern_record.hpp"
@@ -109,13 +110,13 @@ class Sorter {
     const std::string name = ascii_lower(picture.filename().string());
     if (names_file(materials_, name) || names_file(materials_, as_uri(name))) return true;
     const std::string stem = picture.stem().string();
-    return std::ranges::any_of(sorted_.models, [&](const fs::path& model) {
+    return ranges::any_of(sorted_.models, [&](const fs::path& model) {
       if (model.parent_path() != picture.parent_path()) return false;
       if (is_map_name(stem, model.stem().string())) return true;
       if (!is_own_picture(stem, model.stem().string())) return false;
       const auto source = small_model(path(model.string()), folder_);
       return source && *source &&
-             std::ranges::any_of((*source)->materials, [&](const SourceMaterial& material) {
+             ranges::any_of((*source)->materials, [&](const SourceMaterial& material) {
                return fs::path(material.diffuse_map).filename() == picture.filename();
              });
     });

@@ -16,6 +16,7 @@
 #include "bake/video/encode_video.hpp"
 #include "formats/base/nearest.hpp"
 #include "formats/base/path.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/rules.hpp"
 
 namespace modar {
@@ -158,7 +159,7 @@ std::uint32_t index_of(const BundleContent& content, const std::vector<Record>& 
   const auto named = [&](const Record& record) {
     return content.names.compare(record.name.offset, record.name.length, name) == 0;
   };
-  return static_cast<std::uint32_t>(std::ranges::find_if(records, named) - records.begin());
+  return static_cast<std::uint32_t>(ranges::find_if(records, named) - records.begin());
 }
 
 class NodeMaker {
@@ -264,7 +265,7 @@ class NodeMaker {
   Result<std::uint32_t> add_media(const NodeRequest& request) {
     MODAR_ASSIGN(const BundleContent part,
                  source_ ? source_(request) : bake_media(request, request_, report_));
-    const auto same = std::ranges::find(content_.media_data, part.media_data[0]);
+    const auto same = ranges::find(content_.media_data, part.media_data[0]);
     const auto index = static_cast<std::uint32_t>(same - content_.media_data.begin());
     if (same != content_.media_data.end()) return index;
     MediaRecord media = part.media[0];

@@ -13,6 +13,7 @@
 #include "bake/json.hpp"
 #include "bake/pattern/score.hpp"
 #include "formats/base/path.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/bundle_writer.hpp"
 #include "formats/component.hpp"
 #include "formats/field_table.hpp"
@@ -33,10 +34,10 @@ bool ContentLog::concerns(std::initializer_list<SectionType> types) const {
   if (!options.changed) return true;
   const std::uint64_t head = sizeof(FileHeader) + bundle.sections().size_bytes();
   return *options.changed < head ||
-         std::ranges::any_of(bundle.sections(), [&](const SectionEntry& entry) {
+         ranges::any_of(bundle.sections(), [&](const SectionEntry& entry) {
            return *options.changed >= entry.offset &&
                   *options.changed < entry.offset + entry.size &&
-                  std::ranges::count(types, static_cast<SectionType>(entry.type)) > 0;
+                  ranges::count(types, static_cast<SectionType>(entry.type)) > 0;
          });
 }
 
@@ -101,7 +102,7 @@ void check_parameter_sets(ContentLog& log) {
   constexpr std::size_t kSize =
       offsetof(ParameterSetRecord, reserved) - offsetof(ParameterSetRecord, id);
   for (const ParameterSetRecord& set : log.bundle.parameter_sets()) {
-    const bool known = std::ranges::any_of(paper_parameter_sets(), [&](const auto& other) {
+    const bool known = ranges::any_of(paper_parameter_sets(), [&](const auto& other) {
       return log.bundle.name(set.name) == parameter_set_name(other.id) &&
              std::memcmp(&set.id, &other.id, kSize) == 0;
     });
@@ -167,7 +168,7 @@ void check_numbers(ContentLog& log) {
 }
 
 void check_unused(ContentLog& log, const char* table, std::vector<bool> used) {
-  const auto unused = std::ranges::find(used, false);
+  const auto unused = ranges::find(used, false);
   if (unused == used.end()) return;
   log.tell(WorkstationRule::kUnused, table, log.bundle.bytes().data(),
            "nothing uses number " + std::to_string(unused - used.begin()));

@@ -14,6 +14,7 @@
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/mesh/rays/triangle_tree.hpp"
 #include "formats/base/parallel.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/component.hpp"
 #include "formats/transport/chunk_order.hpp"
 
@@ -72,7 +73,7 @@ bool in_order(const ChunkPart& part, std::size_t stride) {
     if (place[part.levels[0][i]] != ordered[i]) return false;
   }
   for (std::size_t v = 1; v < place.size(); ++v) {
-    if (place[v] < place[v - 1] && std::ranges::count(part.group_ends, v) == 0) return false;
+    if (place[v] < place[v - 1] && ranges::count(part.group_ends, v) == 0) return false;
   }
   LevelOrderer level_orderer;
   for (std::size_t l = 1; l < part.levels.size(); ++l) {

@@ -15,6 +15,7 @@
 #include "bake/check/content/content_rules.hpp"
 #include "bake/mesh/draw_order.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/draw_order.hpp"
 #include "formats/trim.hpp"
 
@@ -113,8 +114,8 @@ void check_scene(ContentLog& log, const BundleContent& content, const Json& scen
     const std::string fault = place_fault(log.bundle, content, scene, *stated);
     if (!fault.empty())
       log.tell(WorkstationRule::kMetaDiffers, where, &scene, "the meta text states " + fault);
-    const bool lit = std::ranges::any_of(
-        content.lights, [s](const LightRecord& light) { return light.scene == s; });
+    const bool lit =
+        ranges::any_of(content.lights, [s](const LightRecord& light) { return light.scene == s; });
     if (lit != stated->find("light").has_value()) {
       log.tell(WorkstationRule::kMetaDiffers, where, &scene,
                "the meta text states a light, or the bundle has one, and not both");

@@ -11,6 +11,7 @@
 #include "bake/bundle/bundle_builder.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/pattern/pattern.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/paper_tracker.hpp"
 #include "modar/pose_loop.hpp"
@@ -216,7 +217,7 @@ Result<std::vector<PatternRange>> check_poses(const BundleView& bundle,
   for (std::uint32_t p = 0; p < bundle.patterns().size(); ++p) {
     const PatternRecord& record = bundle.patterns()[p];
     const auto path =
-        std::ranges::find(options.pictures, bundle.name(record.name), &PatternRequest::name);
+        ranges::find(options.pictures, bundle.name(record.name), &PatternRequest::name);
     if (path == options.pictures.end()) {
       tell(bundle, record, sink, WorkstationRule::kSourceMissing,
            "its picture is needed to render views of it");

@@ -27,17 +27,18 @@ struct ShadedVertex {
   glm::dvec4 colour{1.0};
 };
 
-long wrapped(long x, long size, Wrap wrap) {
-  if (wrap == Wrap::kClamp) return std::clamp(x, 0L, size - 1);
-  const long period = wrap == Wrap::kMirror ? 2 * size : size;
+std::int64_t wrapped(std::int64_t x, std::int64_t size, Wrap wrap) {
+  if (wrap == Wrap::kClamp) return std::clamp<std::int64_t>(x, 0, size - 1);
+  const std::int64_t period = wrap == Wrap::kMirror ? 2 * size : size;
   x = (x % period + period) % period;
   return std::min(x, 2 * size - 1 - x);
 }
 
 /// Texel of a level, wrapped or clamped.
-glm::dvec4 texel(const RgbaImage& image, long x, long y, const std::array<Wrap, 2>& wrap) {
-  x = wrapped(x, long{image.width}, wrap[0]);
-  y = wrapped(y, long{image.height}, wrap[1]);
+glm::dvec4 texel(const RgbaImage& image, std::int64_t x, std::int64_t y,
+                 const std::array<Wrap, 2>& wrap) {
+  x = wrapped(x, std::int64_t{image.width}, wrap[0]);
+  y = wrapped(y, std::int64_t{image.height}, wrap[1]);
   const std::uint8_t* p = image.pixels.data() + 4 * (static_cast<std::size_t>(y) * image.width +
                                                      static_cast<std::size_t>(x));
   return glm::dvec4(p[0], p[1], p[2], p[3]) / 255.0;
@@ -46,8 +47,8 @@ glm::dvec4 texel(const RgbaImage& image, long x, long y, const std::array<Wrap, 
 glm::dvec4 bilinear(const RgbaImage& image, const glm::dvec2& uv, const std::array<Wrap, 2>& wrap) {
   const double x = uv.x * image.width - 0.5;
   const double y = uv.y * image.height - 0.5;
-  const auto left = static_cast<long>(std::floor(x));
-  const auto top = static_cast<long>(std::floor(y));
+  const auto left = static_cast<std::int64_t>(std::floor(x));
+  const auto top = static_cast<std::int64_t>(std::floor(y));
   const double u = x - static_cast<double>(left);
   const double v = y - static_cast<double>(top);
   return glm::mix(

@@ -21,6 +21,7 @@
 #include "bake/mesh/repair/repair.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/texture/relief/relief.hpp"
+#include "formats/base/ranges.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/renderer.hpp"
 
@@ -350,8 +351,7 @@ Result<std::vector<ModelLook>> check_looks(const BundleView& bundle, const Visua
   std::vector<std::uint32_t> models;  // of the looks
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
     const ModelRecord& model = bundle.models()[m];
-    const auto path =
-        std::ranges::find(options.models, bundle.name(model.name), &ModelRequest::name);
+    const auto path = ranges::find(options.models, bundle.name(model.name), &ModelRequest::name);
     if (path == options.models.end()) continue;  // SOURCE_MISSING reports it
     MODAR_ASSIGN(ModelLook look, looker.look(m, *path));
     looks.push_back(std::move(look));

@@ -7,6 +7,7 @@
 #include "bake/options/options.hpp"
 #include "bake/options/request_text.hpp"
 #include "formats/base/path.hpp"
+#include "formats/base/ranges.hpp"
 
 namespace modar {
 namespace {
@@ -30,7 +31,7 @@ std::vector<Json> entries_of(const Json& document, const char* kind) {
 /// A name of a scene or a pattern that is among the sources: others cannot be baked.
 template <class Range>
 bool is_given(const Range& sources, const std::string& name) {
-  return std::ranges::any_of(sources, [&](const auto& source) { return source.name == name; });
+  return ranges::any_of(sources, [&](const auto& source) { return source.name == name; });
 }
 
 void take_three(const Json& stated, const char* key, std::array<double, 3>& values) {

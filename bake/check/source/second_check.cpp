@@ -18,6 +18,7 @@
 #include "bake/image/resample.hpp"
 #include "bake/io/input.hpp"
 #include "bake/process/process.hpp"
+#include "formats/base/ranges.hpp"
 
 namespace modar {
 namespace {
@@ -239,7 +240,7 @@ Result<void> check_second(const BundleView& bundle, const BakeRequest& request,
                           const std::string& reader, const IssueSink& sink) {
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
     const std::string name(bundle.name(bundle.models()[m].name));
-    const auto asked = std::ranges::find(request.models, name, &ModelRequest::name);
+    const auto asked = ranges::find(request.models, name, &ModelRequest::name);
     if (asked == request.models.end()) continue;  // SOURCE_MISSING reports it
     std::string why = "the program '" + reader + "' of the laboratory is not installed";
     std::vector<Issue> found;

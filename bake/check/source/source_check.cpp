@@ -15,6 +15,7 @@
 #include "bake/check/source/source_measure.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/json.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/bundle_writer.hpp"
 #include "formats/sections.hpp"
 
@@ -64,7 +65,7 @@ class PartHash {
     return bytes(std::as_bytes(std::span(&record, 1)).subspan(first, second - first));
   }
   PartHash& text(std::string_view text) {
-    return value(text.size()).bytes(std::as_bytes(std::span(text)));
+    return value(text.size()).bytes(std::as_bytes(std::span(text.data(), text.size())));
   }
   [[nodiscard]] std::uint64_t hash() const { return hash_; }
 
@@ -295,7 +296,7 @@ class SourceCheck {
   }
 
   static bool has_all(const Assets& assets, const std::vector<std::string>& labels) {
-    return std::ranges::all_of(labels, [&](const auto& each) { return assets.contains(each); });
+    return ranges::all_of(labels, [&](const auto& each) { return assets.contains(each); });
   }
 
   /// An asset that was not baked again.

@@ -15,6 +15,7 @@
 #include "bake/bundle/bundle_json.hpp"
 #include "bake/bundle/scene/scene_placement.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/tracker_record.hpp"
 #include "modar/camera.hpp"
 #include "modar/gl_context.hpp"
@@ -269,7 +270,7 @@ std::string wireframe_svg(const BundleView& bundle, std::uint32_t model_index, s
   for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
     add_chunk(bundle, model, c, level, focal, model_view(rotation), triangles);
   }
-  std::ranges::sort(triangles, {}, &DrawnTriangle::depth);
+  ranges::sort(triangles, {}, &DrawnTriangle::depth);
   // Behind 20 times as many, nobody sees single triangles: the nearest represent all.
   if (triangles.size() > 20 * most) {
     triangles.erase(triangles.begin(), triangles.end() - static_cast<std::ptrdiff_t>(20 * most));

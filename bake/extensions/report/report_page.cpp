@@ -517,7 +517,8 @@ class Page {
       add(name(bundle_.patterns()[p].name), "pattern", patterns[p]);
     }
     add("tables, names, padding", "rest", rest);
-    std::ranges::stable_sort(items, std::greater(), &TreemapItem::size);
+    std::stable_sort(items.begin(), items.end(),
+                     [](const TreemapItem& a, const TreemapItem& b) { return a.size > b.size; });
     return items;
   }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "formats/base/address.hpp"
+#include "formats/base/ranges.hpp"
 
 namespace modar {
 
@@ -25,7 +26,7 @@ std::string models_on(const BundleView& bundle, std::uint32_t pattern) {
   for (const SceneRecord& scene : bundle.scenes()) {
     if (scene.pattern != pattern) continue;
     const std::string name = title_of(bundle.name(bundle.models()[scene.model].name));
-    if (std::ranges::find(names, name) == names.end()) names.push_back(name);
+    if (ranges::find(names, name) == names.end()) names.push_back(name);
   }
   std::string all;
   for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;

@@ -534,7 +534,8 @@ Result<RootSet> trusted_keys(const SiteOptions& options) {
 
 Result<std::string> find_page() {
   const fs::path programs = program_folder();
-  for (const fs::path& folder : {programs / "../share/modar/web", programs / "../../web/web"}) {
+  for (const fs::path& folder :
+       {programs / "../share/modar/web", programs / "../../web/web", programs / ".."}) {
     if (fs::exists(folder / "engine-plain.wasm")) return folder.lexically_normal().string();
   }
   return fail(ExitCode::kUnsupported, "web.page", "modar web", "the page's engine was not built",

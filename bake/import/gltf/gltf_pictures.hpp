@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -26,7 +27,7 @@ struct GltfPictures {
   Alpha alpha = Alpha::kKept;
   double cutoff = 0.5;
 
-  auto operator<=>(const GltfPictures&) const = default;
+  std::partial_ordering operator<=>(const GltfPictures&) const = default;
   /// The one whose size and name the result has: the colour, or the first that there is.
   [[nodiscard]] const std::string& first() const {
     return !colour.empty() ? colour : !emissive.empty() ? emissive : occlusion;

@@ -8,6 +8,8 @@
 
 #include <glm/common.hpp>
 
+#include "formats/base/ranges.hpp"
+
 namespace modar {
 namespace {
 
@@ -89,7 +91,7 @@ std::string find_tiles(std::string_view name, const ModelFolder& folder) {
 
 void place_maps(SourceModel& model) {
   const auto moved = [](const SourceMaterial& m) { return m.place != MapPlace(); };
-  if (std::ranges::none_of(model.materials, moved) || !own_uvs(model)) return;
+  if (ranges::none_of(model.materials, moved) || !own_uvs(model)) return;
   MovedUvs uvs(model);
   RunCursor materials(model.material_runs);
   for (std::size_t f = 0; f < model.face_count(); ++f) {
@@ -104,7 +106,7 @@ void place_tiles(const ModelFolder& folder, const std::string& label, SourceMode
   const auto tiled = [](const SourceMaterial& m) {
     return m.diffuse_map.find(kTileMark) != std::string::npos;
   };
-  if (std::ranges::none_of(named, tiled)) return;
+  if (ranges::none_of(named, tiled)) return;
   const bool has_uvs = own_uvs(model);
   MovedUvs uvs(model);
   std::map<std::pair<std::uint32_t, int>, std::uint32_t> made;  // by material and tile

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <iterator>
@@ -11,6 +10,8 @@
 #include <optional>
 #include <system_error>
 #include <vector>
+
+#include <fast_float/fast_float.h>
 
 #include "bake/image/image.hpp"
 #include "bake/import/name_form.hpp"
@@ -108,8 +109,9 @@ std::string cleaned(std::string_view name) {
 double number_of(std::string_view word, double other) {
   if (word.starts_with('+')) word.remove_prefix(1);
   double value = 0;
-  const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
-  return result.ec == std::errc() && result.ptr == word.data() + word.size() ? value : other;
+  const auto result = fast_float::from_chars(word.data(), word.data() + word.size(), value);
+  const bool whole = result.ec == std::errc() && result.ptr == word.data() + word.size();
+  return whole && std::isfinite(value) ? value : other;
 }
 
 bool is_number(std::string_view word) {

@@ -83,7 +83,7 @@ const char* parse_real_slow(const char* p, const char* end, double& value, Numbe
 /// Applies a sign without a branch, which random signs would mispredict.
 inline double with_sign(double magnitude, bool negative) {
   const std::uint64_t sign = std::uint64_t{negative} << 63;
-  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(magnitude) | sign);
+  return __builtin_bit_cast(double, __builtin_bit_cast(std::uint64_t, magnitude) | sign);
 }
 
 #ifdef __SSE2__

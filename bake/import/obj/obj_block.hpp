@@ -50,7 +50,7 @@ class Scratch {
   /// Reserves `capacity` elements in all and clears the array.
   void reset(std::size_t capacity) {
     if (capacity > capacity_) {
-      data_ = std::make_unique_for_overwrite<T[]>(capacity);
+      data_.reset(new T[capacity]);
       capacity_ = capacity;
     }
     size_ = 0;

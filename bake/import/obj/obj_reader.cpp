@@ -16,7 +16,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <vector>
 
 #include <glm/common.hpp>
@@ -28,6 +27,7 @@
 #include "bake/import/read_model.hpp"
 #include "bake/import/source_model.hpp"
 #include "bake/import/up_comment.hpp"
+#include "formats/base/parallel.hpp"
 #include "formats/base/path.hpp"
 
 namespace modar {
@@ -375,10 +375,7 @@ Result<void> read_obj_blocks(const ByteSource& source, const std::string& label,
   };
   const std::uint64_t useful = std::min<std::uint64_t>(loader.count(), 64);
   const unsigned threads = totals != nullptr ? 1u : std::min(jobs, static_cast<unsigned>(useful));
-  std::vector<std::thread> others;
-  for (unsigned i = 1; i < threads; ++i) others.emplace_back(work);
-  work();
-  for (std::thread& thread : others) thread.join();
+  run_on_threads(threads, work);
   return to_result(worst, label);
 }
 

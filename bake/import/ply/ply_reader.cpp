@@ -2,22 +2,22 @@
 // what they mean.
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <charconv>
 #include <cstring>
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <string>
 #include <string_view>
 #include <tuple>
 #include <vector>
 
+#include <fast_float/fast_float.h>
+
 #include "bake/import/obj/mtl_reader.hpp"
 #include "bake/import/ply/ply_header.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/import/texture_by_name.hpp"
 #include "bake/import/up_comment.hpp"
+#include "formats/base/ranges.hpp"
 #include "modar/mapped_file.hpp"
 
 namespace modar {
@@ -78,7 +78,7 @@ class PlyValues {
     std::array<char, sizeof(T)> raw{};
     std::memcpy(raw.data(), from, sizeof(T));
     if (encoding_ == PlyHeader::Encoding::kBig) std::reverse(raw.begin(), raw.end());
-    return static_cast<double>(std::bit_cast<T>(raw));
+    return static_cast<double>(__builtin_bit_cast(T, raw));
   }
 
   bool parse_binary(PlyType type, double& value) {
@@ -104,11 +104,9 @@ class PlyValues {
     std::size_t end = at_;
     while (end < bytes_.size() && !space(bytes_[end])) ++end;
     const std::size_t start = at_ < end && bytes_[at_] == '+' ? at_ + 1 : at_;
-    const auto [stop, error] = std::from_chars(bytes_.data() + start, bytes_.data() + end, value);
-    if (start == end || stop != bytes_.data() + end || error == std::errc::invalid_argument) {
-      return false;
-    }
-    if (error == std::errc::result_out_of_range) value = std::numeric_limits<double>::infinity();
+    const char* const last = bytes_.data() + end;
+    const auto [stop, error] = fast_float::from_chars(bytes_.data() + start, last, value);
+    if (start == end || stop != last || error != std::errc()) return false;
     at_ = end;
     return true;
   }
@@ -373,10 +371,10 @@ class PlyReader {
 
   /// Whether the vertices have the scales and turns of 3D Gaussians.
   [[nodiscard]] bool is_splat() const {
-    return std::ranges::any_of(header_.elements, [](const PlyElement& element) {
+    return ranges::any_of(header_.elements, [](const PlyElement& element) {
       const auto has = [&](const char* name) {
-        return std::ranges::any_of(element.properties,
-                                   [&](const PlyProperty& p) { return p.name == name; });
+        return ranges::any_of(element.properties,
+                              [&](const PlyProperty& p) { return p.name == name; });
       };
       return (has("scale_0") && has("rot_0")) || has("f_dc_0");
     });

@@ -1,7 +1,6 @@
 // Reads binary and ASCII STL. The facets' own normals are not used: many programs write zeros.
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -9,6 +8,8 @@
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <fast_float/fast_float.h>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -158,10 +159,8 @@ bool parse_corner(std::string_view line, StlCorner& corner) {
   for (float& value : corner.at) {
     std::string_view word = next_word(line);
     if (word.starts_with('+')) word.remove_prefix(1);
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (word.empty() || end != word.data() + word.size()) return false;
-    if (error == std::errc::result_out_of_range) value = 0;  // closer to 0 than a float can be
-    if (error == std::errc::invalid_argument) return false;
+    const auto [end, error] = fast_float::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc() || end != word.data() + word.size()) return false;
   }
   return true;
 }

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -164,7 +163,7 @@ class PriceQueue {
   // the first of the mantissa.
   static constexpr std::size_t kBuckets = 1 << 12;
   static std::uint16_t bucket_of(float price) {
-    return static_cast<std::uint16_t>(std::bit_cast<std::uint32_t>(price) << 1 >> 20);
+    return static_cast<std::uint16_t>(__builtin_bit_cast(std::uint32_t, price) << 1 >> 20);
   }
   std::uint16_t front() {
     while (lowest_ + std::size_t{1} < kBuckets && heads_[lowest_] == kNone) ++lowest_;

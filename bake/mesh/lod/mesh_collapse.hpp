@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -172,7 +171,7 @@ class MeshCollapser {
       return key() > other.key() || (key() == other.key() && from > other.from);
     }
     [[nodiscard]] std::uint64_t key() const {
-      return std::uint64_t{std::bit_cast<std::uint32_t>(price)} << 32 | to;
+      return std::uint64_t{__builtin_bit_cast(std::uint32_t, price)} << 32 | to;
     }
   };
   /// Where two ends go, and at which price.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -311,16 +310,16 @@ std::optional<Cut> cut_for(const ChunkedMesh& mesh, const std::vector<CollapseSe
   if (!fits({kMost, 1.0})) return std::nullopt;
   // Floats of one sign are in the order of their bits.
   std::uint32_t low = 0;
-  std::uint32_t high = std::bit_cast<std::uint32_t>(kMost);
+  std::uint32_t high = __builtin_bit_cast(std::uint32_t, kMost);
   while (low < high) {
     const std::uint32_t middle = low + (high - low) / 2;
-    if (fits({std::bit_cast<float>(middle), 1.0})) {
+    if (fits({__builtin_bit_cast(float, middle), 1.0})) {
       high = middle;
     } else {
       low = middle + 1;
     }
   }
-  Cut cut{std::bit_cast<float>(low), 1.0};
+  Cut cut{__builtin_bit_cast(float, low), 1.0};
   double less = 0.0;
   for (int i = 0; i < 30; ++i) {
     const double middle = 0.5 * (less + cut.share);

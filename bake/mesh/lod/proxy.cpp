@@ -1,7 +1,6 @@
 // Joins the chunks' coarse levels, collapses the whole, and measures the result.
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -142,7 +141,7 @@ class Numbers {
 };
 
 std::uint64_t bits_of(double value) {
-  return std::bit_cast<std::uint64_t>(value == 0.0 ? 0.0 : value);
+  return __builtin_bit_cast(std::uint64_t, value == 0.0 ? 0.0 : value);
 }
 
 /// What collapses see of the joined levels. Sets the places of the surface's vertices.

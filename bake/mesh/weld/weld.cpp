@@ -3,7 +3,6 @@
 #include "bake/mesh/weld/weld.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -273,9 +272,7 @@ Array<TriangleClass> classify(const SourceModel& source, Array<std::uint8_t>& us
                                              : TriangleClass::kKeep;
       if (classes[t] != TriangleClass::kKeep) continue;
       // Several threads may mark one position, all with the same value.
-      for (int i = 0; i < 3; ++i) {
-        std::atomic_ref<std::uint8_t>(used[v[i]]).store(1, std::memory_order_relaxed);
-      }
+      for (int i = 0; i < 3; ++i) __atomic_store_n(&used[v[i]], 1, __ATOMIC_RELAXED);
     }
   });
   return classes;

@@ -156,7 +156,7 @@ void cut_sheet(const TriMesh& mesh, const std::vector<std::uint32_t>& triangles,
   std::vector<std::uint32_t> box_of(cells.vertices.size(), 0);
   for (std::uint32_t b = 0; b < boxes.size(); ++b) {
     for (std::uint32_t y = boxes[b].top; y < boxes[b].bottom; ++y) {
-      std::fill_n(box_of.begin() + std::ptrdiff_t{y} * cells.width + boxes[b].left,
+      std::fill_n(box_of.data() + std::size_t{y} * cells.width + boxes[b].left,
                   boxes[b].right - boxes[b].left, b);
     }
   }
