@@ -62,6 +62,8 @@ THIRD_PARTIES = {
 # Headers that code of the device never includes (Law 9): each one grows the player by hundreds of KB.
 BANNED_ON_DEVICE = {"iostream", "fstream", "sstream", "ostream", "istream", "iomanip", "filesystem",
                     "locale", "regex", "codecvt"}
+# Takes the place of files in many rooms, and includes their headers.
+WASM = "bake/extensions/wasm/"
 # Of the lab, what looks into the renderer.
 INSIDE = (r"bake/extensions/lab/(render_bench|plain_shading)\.cpp",)
 # Files of the runtime that a phone never builds.
@@ -87,7 +89,7 @@ def standard_header(name):
 # Rooms of the workstation from the bottom up: each includes those before it, and of its own rank itself only.
 BAKE_ROOMS = (("bake/process",), ("bake", "bake/memory"), ("bake/io",), ("bake/image",), ("bake/import", "bake/video"), ("bake/mesh",),
               ("bake/texture", "bake/pattern"), ("bake/options",), ("bake/bundle", "bake/export", "bake/ship"),
-              ("bake/check",), ("bake/project",), ("bake/commands",), ("bake/extensions/web", "bake/extensions/adopt", "bake/extensions/report"), ("bake/extensions/studio",), ("bake/extensions/lab",))
+              ("bake/check",), ("bake/project",), ("bake/commands",), ("bake/extensions/web", "bake/extensions/adopt", "bake/extensions/report"), ("bake/extensions/studio",), ("bake/extensions/wasm",), ("bake/extensions/lab",))
 RANK = {room: rank for rank, rooms in enumerate(BAKE_ROOMS) for room in rooms}
 # The doors of the rooms: the headers that other rooms may include. Those of bake/memory and below
 # are for all. The lab measures the inside, and may include everything below it; what it alone
@@ -130,6 +132,7 @@ DOORS = {
     "bake/extensions/report": ("model_pictures.hpp",),
     "bake/project": ("project.hpp", "project_edit.hpp"),
     "bake/extensions/studio": (),
+    "bake/extensions/wasm": (),
     "bake/commands": ("command_line.hpp", "commands.hpp"),
     "bake/extensions/lab": (),
     # Of the runtime, apps and rooms come through runtime/include and runtime/fetch/include.
@@ -148,7 +151,7 @@ DOORS = {
     "runtime/extensions/web": (),
 }
 # Extensions, each with an option of CMake: only extensions and tests include them.
-EXTENSIONS = ("bake/extensions/web", "bake/extensions/adopt", "bake/extensions/report", "bake/extensions/studio", "bake/extensions/lab", "runtime/extensions/paper", "runtime/extensions/web", "runtime/extensions/android")
+EXTENSIONS = ("bake/extensions/web", "bake/extensions/adopt", "bake/extensions/report", "bake/extensions/studio", "bake/extensions/wasm", "bake/extensions/lab", "runtime/extensions/paper", "runtime/extensions/web", "runtime/extensions/android")
 # Larger rooms are divided rather than given more doors.
 MOST_DOORS = 3
 
@@ -165,7 +168,7 @@ def bake_room(path):
 def door_violations(path, name):
     """Of a room's header that is no door of it, included by another room; tests and the lab look inside."""
     here, there = bake_room(path), bake_room(name)
-    if here == there or name.split("/")[0] not in ("bake", "runtime") or path.startswith(("tests/", "bake/extensions/lab/")):
+    if here == there or name.split("/")[0] not in ("bake", "runtime") or path.startswith(("tests/", "bake/extensions/lab/", WASM)):
         return
     if here.count("/") == 2 and here.rsplit("/", 1)[0] == there:  # a room within a room knows it
         return

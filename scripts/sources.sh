@@ -3,6 +3,7 @@
 #   scripts/sources.sh FOLDER PACKAGE...   fetches their archives into FOLDER; existing ones stay
 #   scripts/sources.sh --libraries         libraries of modar::fetch for WebAssembly and Android (libsodium, zstd), unpacked in
 #                                          build/sources (4 MB to fetch, once)
+#   scripts/sources.sh --baker             libraries of `modar` for WebAssembly, the same way (another 230 MB)
 # Exit code 2 where there is no network.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -34,7 +35,7 @@ unpack() { # FOLDER PACKAGE PART...: the parts of the package's tree, as FOLDER/
   [ ! -d "$dir/$package" ] || return 0
   rm -rf "$dir/$package.new"
   mkdir "$dir/$package.new"
-  archives=("$dir/${package}"_*.orig.tar.?z)
+  archives=("$dir/${package}"_*.orig.tar.*)
   tar -xf "${archives[0]}" -C "$dir/$package.new" --strip-components=1 --wildcards "${@/#/*/}"
   mv "$dir/$package.new" "$dir/$package"
 }
@@ -47,9 +48,20 @@ if [ "${1:-}" = --libraries ]; then
   fetch "$dir" libsodium libzstd
   unpack "$dir" libsodium src/libsodium
   unpack "$dir" libzstd lib
+elif [ "${1:-}" = --baker ]; then
+  "$0" --libraries
+  dir=$root/build/sources
+  exec 9> "$dir/lock"
+  flock 9
+  packages=(draco highway lcms2 libjpeg-turbo libpng1.6 libwebp meshoptimizer minizip newlib opencv openmesh tiff zlib)
+  fetch "$dir" "${packages[@]}"
+  unpack "$dir" newlib newlib/libm newlib/libc/include/machine/ieeefp.h
+  unpack "$dir" opencv '[!/]*.txt' LICENSE cmake include platforms/scripts \
+    modules/{calib3d,core,features2d,flann,imgproc,video}
+  for package in "${packages[@]}"; do unpack "$dir" "$package" '*'; done
 elif [ $# -ge 2 ]; then
   fetch "$@"
 else
-  sed -n '2,7s/^# \{0,1\}//p' "$0"
+  sed -n '2,8s/^# \{0,1\}//p' "$0"
   exit 1
 fi

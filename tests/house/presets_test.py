@@ -9,8 +9,9 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(os.environ.get("MODAR_SOURCE_DIR", pathlib.Path(__file__).resolve().parents[2]))
-# `dev` is this build; test.sh builds device, newcomer.sh release and package, tests/web the engine.
-BUILT = {"dev", "device", "release", "package", "web"}
+# `dev` is this build; test.sh builds device, newcomer.sh release and package, tests/web the engine;
+# wasm takes libraries that are built first.
+BUILT = {"dev", "device", "release", "package", "web", "wasm"}
 # The libraries that fuzz targets link, without formats and runtime/track, which house_phone compiles with clang.
 LIBRARIES = ("modar_transport", "modar_fetch", "modar_common", "modar_image", "modar_import", "modar_mesh", "modar_texture", "modar_pattern", "modar_options",
              "modar_bundle", "modar_check", "modar_ship", "modar_project")

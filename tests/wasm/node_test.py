@@ -1,0 +1,136 @@
+"""`modar` under Node against the native program: the same bytes, messages and exit codes; and the npm package in an empty folder.
+
+MODAR_MORE: a folder whose models and pictures are baked as well, each by itself.
+"""
+import filecmp
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
+from programs import BIN, ROOT  # noqa: E402
+
+MODELS = ("*.obj", "*.glb", "*.gltf", "*.ply", "*.stl")
+PICTURES = ("*.png", "*.jpg", "*.tif", "*.tiff", "*.webp")
+ASSETS = ROOT / "assets"
+
+
+class Node(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.base = pathlib.Path(tempfile.mkdtemp(prefix="modar-node-"))
+        cls.addClassCleanup(shutil.rmtree, cls.base, ignore_errors=True)
+        for folder in ("native", "node"):
+            (cls.base / folder).mkdir()
+        package = cls.base / "package" / "bin"
+        package.mkdir(parents=True)
+        for file in ("modar", "paths.js"):
+            shutil.copy(ROOT / "bake/extensions/wasm" / file, package)
+        for file in ("baker.js", "baker.wasm"):
+            shutil.copy(ROOT / "build/wasm/bin" / file, package)
+        cls.programs = {"native": [BIN / "modar"], "node": ["node", package / "modar"]}
+
+    def both(self, *words, environment=None):
+        """Runs both programs, each in its folder; their outcomes must be the same. Answers the folders."""
+        folders = [self.base / kind for kind in self.programs]
+        outcomes = [subprocess.run([*program, *map(str, words)], cwd=folder, capture_output=True, env=environment)
+                    for program, folder in zip(self.programs.values(), folders)]
+        self.assertEqual(outcomes[0].returncode, outcomes[1].returncode, outcomes[1].stderr[-600:])
+        return folders, outcomes
+
+    def same(self, name, *words):
+        folders, outcomes = self.both(*words)
+        native, node = (folder / name for folder in folders)
+        self.assertEqual(native.exists(), node.exists(), words)
+        if native.exists():
+            self.assertTrue(filecmp.cmp(native, node, shallow=False), f"{words}: other bytes")
+        return outcomes
+
+    def bake(self, *words):
+        return self.same("a.modar", "bake", *words, "--quiet", "-o", "a.modar")
+
+    def test_assets_have_the_bytes_of_the_native_program(self):
+        for model in sorted((ASSETS / "models").glob("*.obj")):
+            with self.subTest(model.name):
+                self.bake(model)
+        for picture in sorted((ASSETS / "patterns").glob("*.png")):
+            with self.subTest(picture.name):
+                self.bake(picture)
+
+    def test_further_files_have_them_too(self):
+        more = os.environ.get("MODAR_MORE")
+        if more is None:
+            self.skipTest("MODAR_MORE names no folder")
+        for kinds in (MODELS, PICTURES):
+            for file in sorted(file for kind in kinds for file in pathlib.Path(more).rglob(kind)):
+                with self.subTest(str(file)):
+                    self.bake(file)
+
+    def test_a_scene_with_options_and_what_reads_it(self):
+        self.bake(ASSETS / "models/pottery.obj", f"{ASSETS / 'patterns/cover.png'}:210mm", "--scene", "cover=pottery,scale=0.5",
+                  "--jobs", "4")
+        for command in (["inspect", "a.modar", "--json"], ["check", "a.modar", "--json"], ["check", "nothing.modar"],
+                        ["bake", "nothing.obj", "-o", "b.modar"], ["pattern", "score", ASSETS / "patterns/cover.png", "--json"],
+                        ["--version"], ["bake", "--help"]):
+            with self.subTest(command):
+                _, (native, node) = self.both(*command)
+                self.assertEqual(native.stdout, node.stdout)
+                self.assertEqual(native.stderr, node.stderr)
+
+    def test_golden_bundles_are_checked_alike(self):
+        for bundle in sorted((ROOT / "tests/golden").glob("*.modar")):
+            with self.subTest(bundle.name):
+                _, (native, node) = self.both("check", bundle, "--json")
+                self.assertEqual(native.stdout, node.stdout)
+
+    def test_a_project(self):
+        for folder in (self.base / kind for kind in self.programs):
+            project = folder / "project"
+            project.mkdir()
+            for file in ("models/pottery.obj", "models/pottery.mtl", "models/pottery.png", "patterns/cover.png"):
+                shutil.copy(ASSETS / file, project)
+        self.both("init", "project")
+        for _ in range(2):  # and from its cache
+            self.same("project/out/project.modar", "bake", "--project", "project", "--quiet")
+
+    def test_what_node_cannot_do_says_what_to_do(self):
+        subprocess.run([*self.programs["node"], "ship", "keygen", "-o", "k"], cwd=self.base, check=True, capture_output=True)
+        for words, cause in ((["ship", "verify", "https://a.example/ar", "--trust", "k.pub"], "folders alone"),
+                             (["bake", ASSETS / "models/pottery.obj", "--memory", "1G", "-o", "b.modar"], "4 GB")):
+            with self.subTest(words):
+                run = subprocess.run([*self.programs["node"], *map(str, words)], cwd=self.base, capture_output=True, text=True)
+                self.assertNotEqual(run.returncode, 0)
+                self.assertIn(cause, run.stderr)
+                self.assertIn("Debian", run.stderr)
+
+    def test_the_package_bakes_in_an_empty_folder(self):
+        npm = shutil.which("npm")
+        if npm is None or not (ROOT / "build/web/web/engine-plain.wasm").exists():
+            self.skipTest("needs npm and the preset web")
+        laid, empty = self.base / "laid", self.base / "an empty folder"
+        empty.mkdir()
+        subprocess.run([ROOT / "scripts/wasm/package.sh", laid], check=True)
+        tarball = json.loads(subprocess.run([npm, "pack", "--json", laid], cwd=self.base, capture_output=True, check=True).stdout)[0]
+        self.assertLessEqual(tarball["size"], 6_000_000)
+        self.assertNotIn("scripts", json.loads((laid / "package.json").read_text()))
+        subprocess.run([npm, "install", "--offline", "--no-audit", "--no-fund", self.base / tarball["filename"]], cwd=empty, check=True,
+                       capture_output=True)
+        for file in ("models/statue.obj", "patterns/cover.png"):
+            shutil.copy(ASSETS / file, empty)
+        words = ["bake", "statue.obj", "cover.png", "--quiet", "-o"]
+        subprocess.run([shutil.which("npx"), "modar", *words, "poster.modar"], cwd=empty, check=True)
+        subprocess.run([BIN / "modar", *words, "native.modar"], cwd=empty, check=True)
+        self.assertTrue(filecmp.cmp(empty / "poster.modar", empty / "native.modar", shallow=False))
+        for program, site in ((["node_modules/.bin/modar"], "site"), ([BIN / "modar"], "native-site")):
+            subprocess.run([*program, "web", "poster.modar", "-o", site], cwd=empty, check=True, capture_output=True)
+        differing = subprocess.run(["diff", "-rq", "site", "native-site"], cwd=empty, capture_output=True, text=True)
+        self.assertEqual(differing.stdout, "")
+
+
+if __name__ == "__main__":
+    unittest.main()
