@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # Makes all files of a release in one folder:
-#   scripts/release.sh [--key FILE] [--twice] [--out DIR]      (default: out/release)
+#   scripts/release.sh [--key FILE] [--twice] [--npx] [--out DIR]      (default: out/release)
 #   *.deb                  the Debian packages, clean for lintian, with the page's engine
 #   modar-web-V.tar.gz     the page and its engine, for those who build in place: unpack as build/web
-#   modar-V.tgz            the engine as an npm package
+#   modar-V.tgz            the engine as an npm package; with --npx the program `modar` for Node too (12 CPU-minutes more)
 #   modar-V.apk            the app with the demo's bundle, where ANDROID_NDK is set (see scripts/apk.sh)
 #   modar-V-oci.tar        modar and the player on a bare Debian 12 as a container (OCI archive):
 #                          podman run -v "$PWD:/srv" oci-archive:modar-V-oci.tar bake --model vase.obj -o vase.modar
@@ -16,11 +16,12 @@
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
-key="" twice=no out=out/release
+key="" twice=no npx=no out=out/release
 while [ $# -gt 0 ]; do
   case $1 in
     --key | --out) [ $# -ge 2 ] || { echo "release.sh: $1 needs a value" >&2; exit 1; }; printf -v "${1#--}" %s "$2"; shift ;;
     --twice) twice=yes ;;
+    --npx) npx=yes ;;
     -h | --help) sed -n '2,16s/^# \{0,1\}//p' "$0"; exit 0 ;;
     *) echo "release.sh: unknown option '$1'; try --help" >&2; exit 1 ;;
   esac
@@ -42,17 +43,25 @@ npm_files() {  # FOLDER: what its package.json lists
 }
 
 build() {  # FOLDER OUT: engine and packages of the checkout in FOLDER, whatever options its builds had
-  local tree=$1 to=$2
+  local tree=$1 to=$2 npm=$1/build/web/web presets=(web package)
   (cd "$tree" && scripts/sources.sh --libraries)
-  for preset in web package; do
+  if [ $npx = yes ]; then
+    "$tree/scripts/wasm/libraries.sh"
+    presets+=(wasm)
+  fi
+  for preset in "${presets[@]}"; do
     (cd "$tree" && cmake --fresh --preset $preset && cmake --build --preset $preset)
   done
   mkdir -p "$to"
   cp "$tree"/build/release/packages/*.deb "$to"
   packed -C "$tree/build/web" web >"$to/modar-web-$version.tar.gz"
   # As `npm pack` lays it out, whose bytes differ from version to version.
-  npm_files "$tree/build/web/web" >"$work/npm-files"
-  packed -C "$tree/build/web/web" --transform 's,^,package/,' -T "$work/npm-files" >"$to/modar-$version.tgz"
+  if [ $npx = yes ]; then
+    npm=$work/npm
+    "$tree/scripts/wasm/package.sh" "$npm"
+  fi
+  npm_files "$npm" >"$work/npm-files"
+  packed -C "$npm" --transform 's,^,package/,' -T "$work/npm-files" >"$to/modar-$version.tgz"
 }
 look() {  # Lintian's errors and warnings stop a release.
   lintian --fail-on error,warning --allow-root "$out"/*.deb
