@@ -52,8 +52,9 @@ export const STAGE = {
  */
 export function place({offset, second, secondSize = 0}, raw, take) {
   const end = raw.length - secondSize;
+  const rest = raw.slice(end);  // whoever takes bytes may give their memory away
   take(offset, raw.subarray(0, end));
-  if (second) take(second, raw.subarray(end));
+  if (second) take(second, rest);
 }
 
 /** @param {Uint8Array} start */
