@@ -20,7 +20,7 @@ NOT_RUN = (
     (r"^modar-play .* --input camera", "camera"),
     (r"^modar calibrate ", "camera"),
     (r"^adb |^for phone in |^  adb |^done$", "phone"),
-    (r"^modar-fetch http|^npm install modar", "network"),
+    (r"^modar-fetch http|^npm install modar|^tests/bench/three_pictures\.py ", "network"),
     (r"^export ANDROID_NDK=|^scripts/apk\.sh ", "network"),  # of Google, for the NDK; apk_test.py makes the app without it
 )
 # What another gate of scripts/test.sh runs: the file, and its words for it.
@@ -37,6 +37,7 @@ RUN_ELSEWHERE = (
     (r"^cmake --preset d(ev|evice) &&", "scripts/test.sh", "cmake --preset device"),
     (r"^ctest --preset dev ", "scripts/test.sh", "ctest --preset dev"),
     (r"^npm install \./build/web/web", "tests/web/package_test.py", "npm"),
+    (r"^npx modar ", "tests/wasm/node_test.py", "bake"),
     (r"^modar studio ", "tests/studio/server_test.py", '"studio"'),
     (r"^modar bake --watch", "tests/cli/project_test.py", '"--watch"'),
     (r"^modar plan .*srun", "tests/cli/project_test.py", '"plan", "--ninja", "--cache"'),

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 
-import { isPacked } from '../../runtime/extensions/web/arrival.js';
+import { isPacked, place } from '../../runtime/extensions/web/arrival.js';
 import { textsOf, titleOf } from '../../runtime/extensions/web/bundle.js';
 import { hostApp, mainCamera } from '../../runtime/extensions/web/camera.js';
 import { isRotten } from '../../runtime/extensions/web/copy.js';
@@ -14,6 +14,18 @@ import { groundTransform, viewFrom } from '../../runtime/extensions/web/turntabl
 import { directionOf, fill, labelOf } from '../../runtime/extensions/web/viewer-words.js';
 
 const near = (got, wanted) => got.forEach((value, i) => assert.ok(Math.abs(value - wanted[i]) < 1e-6, `${got} is not ${wanted}`));
+
+test('a mesh has two places, and whoever takes the first may give its memory away', () => {
+  const taken = [];
+  const take = (offset, bytes) => {
+    taken.push([offset, [...bytes]]);
+    structuredClone(bytes, { transfer: [bytes.buffer] });
+  };
+  place({ offset: 7, size: 5, second: 90, secondSize: 2 }, Uint8Array.of(1, 2, 3, 4, 5), take);
+  place({ offset: 8, size: 2, second: 0, secondSize: 0 }, Uint8Array.of(6, 7), take);
+  place({ offset: 9, size: 1 }, Uint8Array.of(8), take);
+  assert.deepEqual(taken, [[7, [1, 2, 3]], [90, [4, 5]], [8, [6, 7]], [9, [8]]]);
+});
 
 test('a label has the models\' name, the picture its own', () => {
   const pattern = { name: 'cover', title: 'cover', models: 'spider', image: '', width: 1, height: 1 };
