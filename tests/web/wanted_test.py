@@ -192,7 +192,8 @@ class Wanted(ProgramTest):
         print(f"answers take 400 ms, the longest of {seen['frames']} frames {seen['longest']:.0f} ms, {self.http.most_at_once} requests at once")
         self.assertLess(seen["longest"], 300)
         self.assertGreater(self.http.most_at_once, 1, "Chromium's cache answers one request of an address after the other")
-        self.assertLessEqual(self.http.most_at_once, 3)
+        # As many as MOST_OPEN bytes hold: 3 while levels came uncoded.
+        self.assertLessEqual(self.http.most_at_once, 5)
         self.assertLess(self.brought("slow"), 0.7 * (len(self.http.files["ground.packed"]) - self.http.first["ground.packed"]))
 
     def test_what_is_wrong_is_not_drawn_and_comes_again(self):
