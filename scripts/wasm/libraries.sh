@@ -41,9 +41,11 @@ switches() {  # ON|OFF NAME...
   printf -- '-D%s\n' "${@/%/=$value}"
 }
 
-if [ ! -e "$sources/opencv/patched" ]; then
+if ! cmp -s "$root/scripts/wasm/opencv.patch" "$sources/opencv/patched"; then
+  rm -rf "$sources/opencv" "$out/log/opencv.done"
+  "$root/scripts/sources.sh" --baker
   patch -d "$sources/opencv" -p1 --quiet <"$root/scripts/wasm/opencv.patch"
-  touch "$sources/opencv/patched"
+  cp "$root/scripts/wasm/opencv.patch" "$sources/opencv/patched"
 fi
 build small "$root/scripts/wasm" "-DSOURCES=$sources"
 mapfile -t off < <(switches OFF PNG_SHARED PNG_TESTS PNG_EXECUTABLES PNG_HARDWARE_OPTIMIZATIONS)

@@ -126,8 +126,8 @@ class Node(unittest.TestCase):
         subprocess.run([shutil.which("npx"), "modar", *words, "poster.modar"], cwd=empty, check=True)
         subprocess.run([BIN / "modar", *words, "native.modar"], cwd=empty, check=True)
         self.assertTrue(filecmp.cmp(empty / "poster.modar", empty / "native.modar", shallow=False))
-        for program, site in ((["node_modules/.bin/modar"], "site"), ([BIN / "modar"], "native-site")):
-            subprocess.run([*program, "web", "poster.modar", "-o", site], cwd=empty, check=True, capture_output=True)
+        for program, words in ((["node_modules/.bin/modar"], ["-o", "site"]), ([BIN / "modar"], ["-o", "native-site", "--page", laid])):
+            subprocess.run([*program, "web", "poster.modar", *words], cwd=empty, check=True, capture_output=True)
         differing = subprocess.run(["diff", "-rq", "site", "native-site"], cwd=empty, capture_output=True, text=True)
         self.assertEqual(differing.stdout, "")
 
