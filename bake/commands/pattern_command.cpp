@@ -575,7 +575,7 @@ Result<ShapeRequest> shape_of(const std::string& path, const std::string& told) 
   PatternRequest pattern{path};
   std::vector<Diagnostic> said;
   MODAR_TRY(find_picture(pattern, said));
-  std::ranges::for_each(said, print_diagnostic);
+  for (const Diagnostic& one : said) print_diagnostic(one);
   return std::move(pattern.shape);
 }
 

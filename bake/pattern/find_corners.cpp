@@ -654,7 +654,7 @@ cv::Matx33d plane_of(const std::array<Point, 4>& corners) {
   const std::array<cv::Point2f, 4> unit = {
       {cv::Point2f(0, 0), cv::Point2f(1, 0), cv::Point2f(1, 1), cv::Point2f(0, 1)}};
   std::array<cv::Point2f, 4> to;
-  std::ranges::copy(corners, to.begin());
+  std::copy(corners.begin(), corners.end(), to.begin());
   return cv::getPerspectiveTransform(unit.data(), to.data());
 }
 
@@ -682,8 +682,8 @@ double detail_in(const Gradients& gradients, const std::array<Point, 4>& figure)
 std::array<Point, 4> grown(const std::array<Point, 4>& figure, double times) {
   const Point middle = (figure[0] + figure[1] + figure[2] + figure[3]) / 4;
   std::array<Point, 4> out;
-  std::ranges::transform(figure, out.begin(),
-                         [&](const Point& corner) { return middle + times * (corner - middle); });
+  ranges::transform(figure, out.begin(),
+                    [&](const Point& corner) { return middle + times * (corner - middle); });
   return out;
 }
 
@@ -704,8 +704,8 @@ bool is_centred(const cv::Matx33d& outer, const std::array<Point, 4>& inner) {
   constexpr double kUneven = 0.06;  // difference of margins, or turn, times the outer one's size
   const cv::Matx33d back = outer.inv();
   std::array<Point, 4> at;
-  std::ranges::transform(inner, at.begin(),
-                         [&](const Point& corner) { return on_plane(back, corner.x, corner.y); });
+  ranges::transform(inner, at.begin(),
+                    [&](const Point& corner) { return on_plane(back, corner.x, corner.y); });
   double uneven = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     const Point off = at[i] + at[(i + 2) % 4] - Point(1, 1);
@@ -753,8 +753,8 @@ bool holds_another(const cv::Mat& rgb, const Gradients& gradients,
   const Foreground object(inside);
   if (!object.known()) return false;
   std::array<Point, 4> held;
-  std::ranges::transform(object.corners(), held.begin(),
-                         [&](const Point& at) { return on_plane(plane, at.x, at.y); });
+  ranges::transform(object.corners(), held.begin(),
+                    [&](const Point& at) { return on_plane(plane, at.x, at.y); });
   return is_held(gradients, corners, refine(gradients, held, {4, 2.5, 1.2}));
 }
 

@@ -322,7 +322,7 @@ Error no_toml(const std::string& path, const toml::parse_error& error) {
       {"escape", "write / for \\, or enclose the text in '...'"},
       {"','", "write numbers with a point (12.5), and quote texts; see toml.io"},
       {"value type", "enclose texts in straight quotes: \"cover.png\""}};
-  const auto* cure = std::ranges::find_if(kCures, [&](const auto& one) {
+  const auto* cure = ranges::find_if(kCures, [&](const auto& one) {
     return error.description().find(one.first) != std::string_view::npos;
   });
   return {ExitCode::kInvalidInput, "project.toml", place(path, error.source()),

@@ -32,6 +32,10 @@ auto count(const Range& range, const Value& value, Part part = {}) {
   return std::count_if(std::begin(range), std::end(range),
                        [&](const auto& e) { return std::invoke(part, e) == value; });
 }
+template <class Range, class Out, class Change>
+void transform(const Range& range, Out out, Change change) {
+  std::transform(std::begin(range), std::end(range), out, change);
+}
 template <class Range, class Less = std::less<>, class Part = std::identity>
 void sort(Range&& range, Less less = {}, Part part = {}) {
   std::sort(std::begin(range), std::end(range), [&](const auto& a, const auto& b) {

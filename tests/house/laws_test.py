@@ -54,6 +54,10 @@ class PlantedViolations(unittest.TestCase):
     def test_bake_uses_public_headers(self):
         self.assert_refused("bake/a.cpp", '#include "runtime/track/solver.hpp"\n', "public headers")
 
+    def test_what_emscripten_lacks(self):
+        for lacked in ("std::ranges::sort(a)", "std::bit_cast<int>(a)"):
+            self.assert_refused("bake/mesh/a.cpp", lacked + ";\n", "emscripten has no")
+
     def test_the_loop_calls_no_libm(self):
         for call in ("double a = std::hypot(1.0, 2.0);", "double a = glm::atan(1.0);", "Eigen::AngleAxisd a;"):
             self.assert_refused("runtime/track/a.cpp", call + "\n", "rounds differently")
