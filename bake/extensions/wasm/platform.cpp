@@ -8,7 +8,6 @@
 #include "bake/process/process.hpp"
 #include "bake/project/interrupts.hpp"
 #include "bake/ship/http/http_reader.hpp"
-#include "bake/ship/limited_process.hpp"
 #include "bake/video/video.hpp"
 
 // Of node.js. words, variables: pointers with a null one behind them; no variables: ours. Answers
@@ -84,19 +83,6 @@ Interrupts::~Interrupts() = default;
 
 std::unique_lock<std::mutex> Interrupts::writing() {
   return std::unique_lock(watch_->writing);
-}
-
-/// In this process, and without limits: WebAssembly is its own cage.
-std::vector<TaskResult> run_limited(std::size_t count, unsigned, const ProcessLimits&,
-                                    const std::function<TaskResult(std::size_t)>& task) {
-  std::vector<TaskResult> results(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    try {
-      results[i] = task(i);
-    } catch (...) {  // out of memory, or a library threw: no result
-    }
-  }
-  return results;
 }
 
 // ---- missing ----
