@@ -26,7 +26,7 @@ struct CodedTriangles {
   std::uint32_t place_count = 0;
   std::uint32_t vertex_count = 0;
   std::vector<std::uint32_t> source_vertices;  ///< of each vertex; of an encoder alone
-  std::vector<std::uint32_t> source_places;    ///< of each place; where they travel, of both
+  std::vector<std::uint32_t> source_places;    ///< of each place; a decoder has them if they travel
 };
 
 constexpr std::uint32_t next_corner(std::uint32_t corner) {
