@@ -9,14 +9,13 @@ import struct
 import subprocess
 import sys
 import tarfile
-import tempfile
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 from browser import Browser, Quiet, Server  # noqa: E402
+from npm_project import PAGE, install  # noqa: E402
 from programs import BIN, COVER, ROOT  # noqa: E402
 
-PAGE = ROOT / "build" / "web" / "web"
 ADAPTERS = ROOT / "runtime" / "extensions" / "web" / "adapters"
 ENGINES = ("three", "fiber", "babylon", "playcanvas")
 NODE = tuple(int(part) for part in subprocess.run(["node", "-p", "process.versions.node"], capture_output=True, text=True).stdout.split(".")) \
@@ -161,20 +160,7 @@ def view_of(seen):
 class Adapters(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        npm = shutil.which("npm")
-        if npm is None:
-            raise unittest.SkipTest("no npm")
-        cls.base = pathlib.Path(tempfile.mkdtemp(prefix="modar-adapters-"))
-        cls.addClassCleanup(shutil.rmtree, cls.base, ignore_errors=True)
-        run = lambda *words: subprocess.run([npm, *words], cwd=cls.base, capture_output=True, text=True)
-        packed = run("pack", "--silent", PAGE)
-        if packed.returncode != 0:
-            raise AssertionError(packed.stderr)
-        (cls.base / "package.json").write_text(json.dumps({
-            "private": True, "type": "module", "dependencies": {**TOOLS, "modar": "file:" + packed.stdout.strip().splitlines()[-1]}}))
-        installed = run("install", "--no-audit", "--no-fund", "--loglevel=error")
-        if installed.returncode != 0:
-            raise unittest.SkipTest("npm cannot fetch the engines: " + installed.stderr[-200:])
+        cls.base, _ = install(cls, TOOLS)
         files = pathlib.Path(os.environ["MODAR_DEMO_FILES"])
         cls.bundle = files / "demo.modar"
         cls.video = cls.base / "camera.y4m"

@@ -7,14 +7,13 @@ import shutil
 import socket
 import subprocess
 import sys
-import tempfile
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 from browser import Browser, Server  # noqa: E402
+from npm_project import PAGE, install  # noqa: E402
 from programs import ROOT  # noqa: E402
 
-PAGE = ROOT / "build" / "web" / "web"
 HERE = pathlib.Path(__file__).resolve().parent / "package"
 # The newest two generations of Vite that this Node runs (Debian 12 has Node 18). Before 8, its server copies packages without the
 # files next to them.
@@ -41,22 +40,7 @@ export function Vase() {
 class Package(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        npm = shutil.which("npm")
-        if npm is None:
-            raise unittest.SkipTest("no npm")
-        cls.base = pathlib.Path(tempfile.mkdtemp(prefix="modar-npm-"))
-        cls.addClassCleanup(shutil.rmtree, cls.base, ignore_errors=True)
-        run = lambda *words: subprocess.run([npm, *words], cwd=cls.base, capture_output=True, text=True)
-        packed = run("pack", "--silent", PAGE)
-        if packed.returncode != 0:
-            raise AssertionError(packed.stderr)
-        cls.tarball = packed.stdout.strip().splitlines()[-1]
-        (cls.base / "package.json").write_text(json.dumps({
-            "name": "museum", "private": True, "type": "module",
-            "dependencies": {**TOOLS, "modar": "file:" + cls.tarball}}))
-        installed = run("install", "--no-audit", "--no-fund", "--loglevel=error")
-        if installed.returncode != 0:
-            raise unittest.SkipTest("npm cannot fetch the tools: " + installed.stderr[-200:])
+        cls.base, cls.tarball = install(cls, TOOLS)
         public = cls.base / "public"
         public.mkdir()
         files = pathlib.Path(os.environ["MODAR_DEMO_FILES"])
