@@ -13,7 +13,7 @@ import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 from browser import Browser, Quiet, Server  # noqa: E402
-from npm_project import PAGE, install  # noqa: E402
+from npm_project import install  # noqa: E402
 from programs import BIN, COVER, ROOT  # noqa: E402
 
 ADAPTERS = ROOT / "runtime" / "extensions" / "web" / "adapters"
