@@ -42,10 +42,12 @@ LOOK = """(async () => {
     let refined = performance.now();
     view.addEventListener('refined', () => { refined = performance.now(); });
     for (const place of %(places)s) {
-      seen.first ??= await hash(view, place);
+      if (%(sway)g) view.drawFrom(0, from([place[0] + %(sway)g, place[1], place[2]]), 300);  // it moves before anything has come
+      else seen.first ??= await hash(view, place);
       refined = performance.now();
       for (let before = refined, now; (now = await new Promise(requestAnimationFrame)) - refined < %(patience)d; before = now) {
         view.drawFrom(0, from([place[0] + %(sway)g * (seen.frames %% 2), place[1], place[2]]), 300);
+        if (%(sway)g) await new Promise((done) => setTimeout(done, 100));  // longer than STILL_MS: the view repeats its drawing meanwhile
         const fades = document.getAnimations().length;
         if (fades > 0) refined = now;  // what has come meanwhile waits for its end
         seen.fades = Math.max(seen.fades, fades);

@@ -145,6 +145,7 @@ export class View extends EventTarget {
   #drawings = 0;
   /** Poses of the last drawing. */
   #before = /** @type {Float32Array} */ (/** @type {unknown} */ ([]));
+  #still = true;
   /** @type {Faded | null} */
   #faded = null;
 
@@ -480,8 +481,11 @@ export class View extends EventTarget {
   /** Without a frame of a camera, changes are drawn soon. */
   #soon() { this.#handle ||= requestAnimationFrame(() => this.#goOn(true)); }
 
-  /** Acts and repeats the last drawing. */
-  #again() {
+  /**
+   * Acts and repeats the last drawing.
+   * @param {boolean} same its poses are the last ones: nothing says whether the eye moves
+   */
+  #again(same = false) {
     if (this.#around >= 0) {
       const {width, height} = fitCanvases(this.#models, this.#picture);
       if (this.#lost || this.#empty) return;
@@ -492,7 +496,7 @@ export class View extends EventTarget {
     /** @type {(since: Float32Array, most: number) => boolean} */
     const moved = (since, most) =>
         since.some((value, i) => i % POSE_FLOATS >= POSE.view && Math.abs(value - poses[i]) > most);
-    const still = !moved(this.#before, FADE_MOVED / FADE_FRAMES);
+    if (!same) this.#still = !moved(this.#before, FADE_MOVED / FADE_FRAMES);
     this.#before = poses;
     this.#act();
     this.#redraw();
@@ -505,7 +509,7 @@ export class View extends EventTarget {
       faded.fades.onfinish = () => this.#uncover(faded);
     }
     if (this.#wanted?.came && !this.#faded) {
-      if (still) this.#cover(triangles);
+      if (this.#still) this.#cover(triangles);
       this.#wanted.use();
       this.#tellRefined();
     }
@@ -552,7 +556,8 @@ export class View extends EventTarget {
    */
   #goOn(fresh = false) {
     this.#handle = 0;
-    if (this.#around >= 0 || performance.now() - this.#drawnAt > STILL_MS) this.#again();
+    if (this.#around >= 0 || performance.now() - this.#drawnAt > STILL_MS)
+      this.#again(this.#around < 0);
     else if (fresh || this.#taps.length || this.#engine.acting)
       this.#handle = requestAnimationFrame(() => this.#goOn(fresh));
   }
