@@ -105,6 +105,51 @@ class Apk(ProgramTest):
             self.assertIn(cure, done.stderr)
             self.assertFalse(out.exists())
 
+    def test_a_phone_is_tried_by_one_command(self):
+        """scripts/phone_try.sh with an adb that lists its calls and answers as a phone does."""
+        adb, asked, apk, out = self.folder / "bin" / "adb", self.folder / "asked", self.folder / "trial.apk", self.folder / "phone"
+        adb.parent.mkdir()
+        with zipfile.ZipFile(apk, "w") as archive:
+            archive.writestr("classes.dex", bytes(1000))
+            archive.writestr("lib/armeabi-v7a/libmodar_jni.so", os.urandom(3000))
+        adb.write_text(f"""#!/bin/sh
+echo "$*" >> {asked}
+case "$*" in
+  devices) printf 'List of devices attached\\n'; printf "$PHONES" ;;
+  *meminfo*) echo '        TOTAL    41234' ;;
+  *screencap*) printf 'a picture' ;;
+  "logcat -d") echo 'a line of the log' ;;
+  pull*) [ -z "$SILENT" ] && echo 'frames: 812, 29.4 a second' > "$3" ;;
+esac
+""")
+        adb.chmod(0o755)
+
+        def tries(*words, phones="ace2\\tdevice\\n", **more):
+            environment = {**os.environ, "PATH": f"{adb.parent}:{os.environ['PATH']}", "PHONES": phones, **more}
+            return run(ROOT / "scripts/phone_try.sh", *words, "--out", out, env=environment)
+
+        done = tries(GOLDEN, "--apk", apk, "--seconds", "11")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("29.4 a second", done.stdout)
+        self.assertIn("TOTAL    41234", done.stdout)
+        calls = asked.read_text().splitlines()
+        started = calls.index("shell am start -W -n org.modar.trial/org.modar.MainActivity")
+        self.assertLess(calls.index(f"install -r {apk}"), started)
+        self.assertEqual(calls[-3:], ["shell input keyevent KEYCODE_HOME", "logcat -d",
+                                      f"pull /sdcard/Android/data/org.modar.trial/files/diagnostics.txt {out}/diagnostics.txt"])
+        self.assertEqual(sorted(path.name for path in out.iterdir()),
+                         ["apk.txt", "diagnostics.txt", "log.txt", "memory.txt", "screen25.png", "screen50.png", "screen90.png"])
+        self.assertRegex((out / "apk.txt").read_text(), r"bytes: the app\n3\d\d\d lib/armeabi-v7a/libmodar_jni.so\n1000 classes.dex")
+        for words, more, code, told in (((), {}, 1, "name a bundle"), ((GOLDEN, "--seconds", "0"), {}, 1, "'0' is no number"),
+                                        ((self.folder / "none.modar",), {}, 2, "cannot be read"),
+                                        ((GOLDEN, "--apk", apk), {"phones": ""}, 5, "0 phones are ready"),
+                                        ((GOLDEN, "--apk", apk), {"phones": "a\\tdevice\\nb\\tdevice\\n"}, 5, "2 phones are ready"),
+                                        ((GOLDEN, "--apk", apk, "--seconds", "1"), {"SILENT": "1"}, 4, "wrote no diagnostics.txt")):
+            with self.subTest(told):
+                done = tries(*words, **more)
+                self.assertEqual(done.returncode, code, done.stderr)
+                self.assertIn(told, done.stderr)
+
     def test_what_androids_tools_say(self):
         bundle = self.folder / "vase.modar"
         bundle.write_bytes(GOLDEN.read_bytes())

@@ -11,7 +11,7 @@ import unittest
 from programs import BIN, COVER, ROOT, ProgramTest
 from web_test import ENGINES
 
-PAGES = ("README.md", "bake/README.md", "formats/README.md", "runtime/README.md", "runtime/TROUBLESHOOTING.md",
+PAGES = ("README.md", "bake/README.md", "formats/README.md", "runtime/README.md", "runtime/TROUBLESHOOTING.md", "runtime/OUTDOORS.md",
          "runtime/extensions/web/README.md", "runtime/extensions/web/MOVING.md", "runtime/extensions/web/npm.md", "runtime/extensions/android/README.md", "bake/extensions/lab/README.md",
          "CONTRIBUTING.md")
 
@@ -82,6 +82,7 @@ class Readme(ProgramTest):
         table = [bytes((190, 180, 160) * width)] * 80
         photo = png.Picture(width, cover.height + 160, bytearray(b"".join(table + rows + table)))
         png.write(self.folder / "photo.jpg", photo, 6)
+        (self.folder / "assets").symlink_to(ROOT / "assets")
         for name in ("cover.png", "poster.jpg"):
             shutil.copy(COVER, self.folder / name)
         # Sides of the box of 120 x 180 x 40 mm, cut out of the cover.

@@ -57,6 +57,18 @@ class Documents(unittest.TestCase):
         self.assertEqual((ROOT / "ISSUES.md").read_text(), printed.stdout,
                          "ISSUES.md is stale: modar check --list-issues > ISSUES.md")
 
+    def test_each_item_of_the_paper_names_a_test_that_exists(self):
+        text = (ROOT / "bake/extensions/lab/README.md").read_text()
+        rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if re.match(r"\| \d+ \|", line)]
+        self.assertEqual([int(row[0]) for row in rows], list(range(1, 87)))
+        files = {path.name: path.read_text() for path in (ROOT / "tests").rglob("*_test.*") if path.suffix in (".py", ".cpp")}
+        for number, item, state, shown in rows:
+            with self.subTest(item=f"{number} {item}"):
+                self.assertIn(state, ("yes", "partly", "phone"))
+                self.assertRegex(shown, "`|]\\(")
+                for file, name in re.findall(r"`(\w+_test\.\w+): (\w+)`", shown):
+                    self.assertRegex(files.get(file, ""), rf"\bdef test_{name}\(" if file.endswith(".py") else rf"\bTEST(_[FP])?\(\w+,\s*{name}\)")
+
     def test_paths_that_documents_name_exist(self):
         missing = []
         for page in PAGES:

@@ -9,8 +9,8 @@
 
 namespace modar {
 
-/// Bytes of a bundle up to which a page loads all of it; of a larger one it loads by ranges what
-/// is seen. MOST_BYTES of modar-view.js.
+/// Bytes of a bundle up to which a page loads all of it; of a larger one it loads, by ranges, the
+/// levels that the view needs. MOST_BYTES of modar-view.js.
 inline constexpr std::size_t kMostWhole = std::size_t{64} << 20;
 
 /// A packed bundle (formats/shipping.md) of forms that pages decode themselves. The same bundle
