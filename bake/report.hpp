@@ -77,12 +77,13 @@ enum class Defect : std::uint8_t {
   kVertex,      ///< positions where fans of triangles touch
   kWinding,     ///< edges of two triangles that wind against each other; repaired: triangles
   kIsland,      ///< small parts
-  kHole         ///< small ones
+  kHole,        ///< small ones
+  kSupport      ///< the flat surface that a scan is on; removed on request, else not counted
 };
 /// Keys of documents (json.md).
 inline constexpr std::array kDefectNames = {
-    "degenerate", "duplicates", "non_manifold_edges", "touching_vertices", "winding",
-    "islands",    "holes"};
+    "degenerate", "duplicates", "non_manifold_edges", "touching_vertices", "winding", "islands",
+    "holes",      "support"};
 inline constexpr std::size_t kDefects = kDefectNames.size();
 /// For people, after a number.
 inline const char* defect_words(Defect defect) {
@@ -92,7 +93,8 @@ inline const char* defect_words(Defect defect) {
                                                         "vertices where parts touch",
                                                         "changes of winding",
                                                         "small islands",
-                                                        "small holes"};
+                                                        "small holes",
+                                                        "support surface"};
   return kWords[static_cast<std::size_t>(defect)];
 }
 

@@ -202,13 +202,15 @@ Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& 
                             source->diagnostics.end());
   note_files(*source, trace.files);
   reading.done(source->positions.size(), source->face_count());
-  if (request.repair) report.repairs.push_back(repair_model(*source, report));
+  if (request.repairs()) {
+    report.repairs.push_back(repair_model(*source, request.repair_support, report));
+  }
   Result<TriMesh> mesh = weld(std::move(*source), report, {request.jobs, request.crease_degrees()});
   if (!mesh) {
     mesh.error().where = model.path;  // it has the model's name only
     return tl::unexpected(mesh.error());
   }
-  report.defects.push_back(count_defects(*mesh, request.repair, report));
+  report.defects.push_back(count_defects(*mesh, request.repairs(), report));
   report.uprights.push_back(request.up ? Upright{*request.up, UpReason::kAsked} : find_up(*mesh));
   if (request.topology) {
     TopologyOptions options;

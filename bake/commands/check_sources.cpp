@@ -145,7 +145,8 @@ Result<std::vector<ModelLook>> compare_looks(const BundleView& bundle, const Che
   options.picture_folder = command.visual;
   options.jobs = command.jobs;
   options.crease = request.crease_degrees();
-  options.repair = request.repair;
+  options.repair = request.repairs();
+  options.repair_support = request.repair_support;
   ProgressBar bar(command.json || command.sarif);
   options.progress = [&bar](double done) { bar.show("look", done); };
   return check_looks(bundle, options, sink);

@@ -210,9 +210,11 @@ constexpr BakeOption kOptions[] = {
      TruthOption{[](BakeRequest& r) -> bool& { return r.smooth; }}},
     {"--repair", "repair", Part::kModel, Group::kGeometry, nullptr, "true",
      "Repair scans: remove small islands and repeated triangles, split non-manifold edges, make "
-     "the "
-     "winding consistent, close small holes",
+     "the winding consistent, close small holes",
      TruthOption{[](BakeRequest& r) -> bool& { return r.repair; }, true}},
+    {"--repair-support", "repair-support", Part::kModel, Group::kGeometry, nullptr, "true",
+     "Repair, and remove the table or floor that a scan is on",
+     TruthOption{[](BakeRequest& r) -> bool& { return r.repair_support; }, true}},
 };
 
 /// Whether the flags are "--" or "--no-" and the name.

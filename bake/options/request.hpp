@@ -145,7 +145,9 @@ struct BakeRequest {
   std::uint32_t crease = 40;  ///< see WeldOptions
   bool smooth = false;        ///< as a crease of 180
   [[nodiscard]] double crease_degrees() const { return smooth ? 180.0 : crease; }
-  bool repair = false;    ///< see repair_model()
+  bool repair = false;          ///< see repair_model()
+  bool repair_support = false;  ///< the same, with the surface that a scan is on
+  [[nodiscard]] bool repairs() const { return repair || repair_support; }
   bool occlusion = true;  ///< measure and store it
   AtlasMode atlas = AtlasMode::kWhereItPays;
   bool topology = false;           ///< measure and state each model's

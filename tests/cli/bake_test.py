@@ -192,6 +192,10 @@ class Bake(ProgramTest):
         self.assertEqual(report["defects"][0]["duplicates"]["count"], 0)
         self.assertEqual(report["bundle"]["models"][0]["triangles"], len(faces))
         self.assertIn("repaired: ", self.modar("inspect", out).stdout)
+        self.assertEqual(done["support"], {"count": 0, "area": 0})
+        alone = self.modar_json("bake", "--model", model, "--no-lods", "--no-occlusion", "--repair-support", "-o", self.folder / "alone.modar")
+        self.assertEqual(alone["bundle"]["models"][0]["repair"], done)
+        self.assertIn("model.no-support", [finding["id"] for finding in alone["findings"]])
         self.assertEqual(self.modar("check", out, "--source", model).returncode, 0)
 
     def test_models_only_and_patterns_only_are_legal(self):

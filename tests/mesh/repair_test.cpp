@@ -124,12 +124,12 @@ struct Repaired {
   std::uint64_t repaired(Defect defect) { return done.of(defect).count; }
 };
 
-Repaired repair(const Shape& shape) {
+Repaired repair(const Shape& shape, bool support = false) {
   Repaired result;
   Report report;
   result.before = count_defects(testing::welded(testing::parse(shape.obj())), false, report);
   SourceModel model = testing::parse(shape.obj());
-  result.done = repair_model(model, report);
+  result.done = repair_model(model, support, report);
   result.mesh = testing::welded(model);
   result.left = count_defects(result.mesh, true, report);
   result.said = report.diagnostics;
@@ -262,6 +262,75 @@ TEST(Repair, KeepsIslandsThatAreMuchOfTheModel) {
   EXPECT_EQ(result.mesh.triangles.size(), shape.faces.size());
   EXPECT_TRUE(std::any_of(result.said.begin(), result.said.end(),
                           [](const Diagnostic& d) { return d.id == "model.islands-kept"; }));
+}
+
+/// A table with a cylinder on it as a scanner sees them from above, turned; inside: the cylinder's
+/// triangles.
+Shape scan(double noise, double height, std::vector<bool>& inside) {
+  constexpr int kSide = 80;
+  Shape shape;
+  std::uint32_t seed = 1;
+  std::vector<bool> high;
+  for (int x = 0; x < kSide; ++x) {
+    for (int y = 0; y < kSide; ++y) {
+      seed = seed * 1664525 + 1013904223;
+      high.push_back(std::hypot(x - 35, y - 42) < 12);
+      const double z = (high.back() ? height : 0) + noise * (seed / 4294967296.0 - 0.5);
+      shape.at(0.8 * x - 0.6 * z, y, 0.6 * x + 0.8 * z);
+    }
+  }
+  inside.clear();
+  for (int x = 0; x + 1 < kSide; ++x) {
+    for (int y = 0; y + 1 < kSide; ++y) {
+      const int a = x * kSide + y, b = a + kSide;
+      for (const auto& f : {std::array{a, b, b + 1}, std::array{a, b + 1, a + 1}}) {
+        shape.faces.push_back(f);
+        inside.push_back(std::any_of(f.begin(), f.end(), [&](int v) {
+          return static_cast<bool>(high[static_cast<std::size_t>(v)]);
+        }));
+      }
+    }
+  }
+  return shape;
+}
+
+TEST(Repair, RemovesTheTableThatAScanIsOn) {
+  for (const double noise : {0.0, 0.6}) {
+    std::vector<bool> inside;
+    const Shape shape = scan(noise, 30, inside);
+    Repaired result = repair(shape, true);
+    EXPECT_EQ(result.repaired(Defect::kSupport), 1u);
+    const auto kept = std::count(inside.begin(), inside.end(), true);
+    ASSERT_EQ(result.mesh.triangles.size(), static_cast<std::size_t>(kept));
+    std::size_t next = 0;  // the cylinder's triangles, in their places
+    for (std::size_t t = 0; t < inside.size(); ++t) {
+      if (!inside[t]) continue;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const auto& p = shape.positions[static_cast<std::size_t>(shape.faces[t][i])];
+        const TriMesh& mesh = result.mesh;
+        const glm::dvec3 q =
+            mesh.placement.center + mesh.placement.scale * mesh.positions[mesh.triangles[next][i]];
+        EXPECT_NEAR(glm::distance(q, glm::dvec3(p[0], p[1], p[2])), 0, 1e-9);
+      }
+      ++next;
+    }
+    if (noise != 0) continue;
+    const double square = 79 * 79 - static_cast<double>(kept) / 2;
+    EXPECT_NEAR(result.done.of(Defect::kSupport).area, square, 1e-6);
+  }
+}
+
+TEST(Repair, KeepsModelsThatAreOnNothing) {
+  std::vector<bool> inside;
+  Shape turned = scan(0, 30, inside);  // a cavity: the plane is in front of it
+  for (auto& f : turned.faces) std::swap(f[1], f[2]);
+  for (const Shape& shape : {pillow(20), turned}) {
+    Repaired result = repair(shape, true);
+    EXPECT_EQ(result.repaired(Defect::kSupport), 0u);
+    EXPECT_EQ(result.mesh.triangles.size(), shape.faces.size());
+    EXPECT_TRUE(std::any_of(result.said.begin(), result.said.end(),
+                            [](const Diagnostic& d) { return d.id == "model.no-support"; }));
+  }
 }
 
 TEST(Repair, JoinsSeamsThatWereWrittenTwice) {

@@ -148,7 +148,7 @@ class VisualComparer {
   Result<ModelLook> look(std::uint32_t index, const ModelRequest& asked) {
     Report quiet;
     MODAR_ASSIGN(SourceModel source, read_model(asked.path, {options_.jobs, asked.own_picture}));
-    if (options_.repair) repair_model(source, quiet);
+    if (options_.repair) repair_model(source, options_.repair_support, quiet);
     MODAR_ASSIGN(TriMesh mesh, weld(std::move(source), quiet, {options_.jobs, options_.crease}));
     const auto upright = stated_upright(bundle_, index);
     ReliefOptions relief;

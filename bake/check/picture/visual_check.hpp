@@ -27,6 +27,7 @@ struct VisualOptions {
   unsigned jobs = 1;
   double crease = 40;   ///< of generated normals, see WeldOptions
   bool repair = false;  ///< compare with the repaired source, see repair_model()
+  bool repair_support = false;
   std::function<void(double done)> progress;  ///< may be empty
 };
 

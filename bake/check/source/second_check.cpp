@@ -251,8 +251,8 @@ Result<void> check_second(const BundleView& bundle, const BakeRequest& request,
       why = ask(reader, asked->path, crease, second);
       if (second.triangles.empty()) break;
       found.clear();
-      const bool reduced = request.repair || (request.most_triangles != 0 &&
-                                              second.triangles.size() > request.most_triangles);
+      const bool reduced = request.repairs() || (request.most_triangles != 0 &&
+                                                 second.triangles.size() > request.most_triangles);
       MODAR_TRY(check_second(bundle, m, second, [&](const Issue& issue) {
         const auto& colour = workstation_issue_kind(WorkstationRule::kSourceColour);
         if (!reduced || issue.kind == &colour) found.push_back(issue);

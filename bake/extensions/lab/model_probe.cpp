@@ -95,7 +95,7 @@ int probe_repair(const std::string& path, unsigned repair, const std::string& ou
   Report report;
   if (repair != 0) {
     const Stopwatch watch;
-    const MeshDefects repaired = repair_model(*model, report);
+    const MeshDefects repaired = repair_model(*model, repair == 2, report);
     for (std::size_t i = 0; i < kDefects; ++i) {
       print(kDefectNames[i], static_cast<double>(repaired.counts[i].count));
       print("  area", repaired.counts[i].area);

@@ -56,6 +56,19 @@ void remove_repeated(Triangles& triangles, DefectCount& count) {
   removal.finish();
 }
 
+/// Returns whether there was one.
+bool remove_support(Triangles& triangles, DefectCount& count) {
+  const std::vector<bool> support = find_support(triangles.surface());
+  if (support.empty()) return false;
+  Removal removal(triangles);
+  for (std::size_t t = 0; t < support.size(); ++t) {
+    if (support[t]) removal.remove(t, count);
+  }
+  removal.finish();
+  count.count = 1;
+  return true;
+}
+
 /// Returns whether there were too many to be removed.
 bool remove_islands(Triangles& triangles, DefectCount& count) {
   const Faces surface = triangles.surface();
@@ -74,7 +87,7 @@ bool remove_islands(Triangles& triangles, DefectCount& count) {
 
 }  // namespace
 
-MeshDefects repair_model(SourceModel& model, Report& report) {
+MeshDefects repair_model(SourceModel& model, bool support, Report& report) {
   StageTimer timer(report, "repair");
   MeshDefects defects;
   defects.model = model.name;
@@ -84,6 +97,11 @@ MeshDefects repair_model(SourceModel& model, Report& report) {
   join_seams(triangles);
   remove_repeated(triangles, defects.of(Defect::kDuplicate));
   make_manifold(triangles, defects);
+  if (support && !remove_support(triangles, defects.of(Defect::kSupport))) {
+    report.diagnostics.push_back({"model.no-support", DiagnosticSeverity::kWarning, model.name, 0,
+                                  "no flat surface with an open border is under the model",
+                                  "cut it off in an editor, or leave out --repair-support"});
+  }
   if (remove_islands(triangles, defects.of(Defect::kIsland))) {
     report.diagnostics.push_back(
         {"model.islands-kept", DiagnosticSeverity::kInfo, model.name, 0,

@@ -10,9 +10,10 @@ namespace modar {
 
 /// Removes small islands and repeated triangles, splits edges and positions where more than one
 /// surface meets, turns triangles that wind against their neighbours, and closes holes of up to 1 %
-/// of the diagonal. Faces become triangles, and open
-/// edges that were written twice one. Positions, uvs, normals and colours of all others stay.
-MeshDefects repair_model(SourceModel& model, Report& report);
+/// of the diagonal. Faces become triangles, and open edges that were written twice one. Positions,
+/// uvs, normals and colours of all others stay. support: removes the flat surface that a scan is
+/// on, too, and warns if no such surface is found.
+MeshDefects repair_model(SourceModel& model, bool support, Report& report);
 
 /// How much of that a mesh has. repaired: positions that were split are not one again. Takes a
 /// hundredth of a bake.

@@ -44,6 +44,10 @@ class Triangles {
 /// winding, and one fan at a position.
 void make_manifold(Triangles& triangles, MeshDefects& defects);
 
+/// The triangles of the flat surface that a scan is on, and of all that is not clear of it: with an
+/// open border, most of the model on its front and at most noise behind. Empty: no such surface.
+std::vector<bool> find_support(const Faces& surface);
+
 /// Closes the holes of a manifold surface that small_hole() names, each by a fan around its middle
 /// that looks as the triangles around it.
 void close_holes(Triangles& triangles, DefectCount& count);
