@@ -268,7 +268,7 @@ Result<Json> project_view(Session& session) {
   for (const ProjectAsset& model : project.models) {
     Json json = asset_json(session, model, model_sizes);
     json.set("missing", Json::list(missing_of(session, model.file)));
-    add_facts(json, facts.models, model.name, {"triangles", "size", "up"});
+    add_facts(json, facts.models, model.name, {"triangles", "size", "up", "repair"});
     models.push_back(std::move(json));
   }
   for (const ProjectAsset& pattern : project.patterns) {

@@ -216,9 +216,11 @@ Json model_facts(const BundleView& bundle, const Json& stated, std::uint32_t ind
     size.push_back(model.scale * (most[axis] - least[axis]));
   }
   const auto upright = upright_in(stated, index);
+  const auto repair = stated_repair(bundle, index);
   return {{"triangles", model.triangle_count},
           {"size", std::move(size)},
-          {"up", upright ? Json(up_axis_name(upright->axis)) : Json()}};
+          {"up", upright ? Json(up_axis_name(upright->axis)) : Json()},
+          {"repair", repair ? defects_json(*repair) : Json()}};
 }
 
 Json pattern_facts(const BundleView& bundle, const Json& stated, std::uint32_t index) {

@@ -1,10 +1,10 @@
 // @ts-check
 // Step 3: models on a picture, moved by drags or numbers, and their texts.
 import {boxOf, halfOf, isInMm, placed, rotation, multiply, turning, turnOf, wrapped} from './placing.js';
-import {button, finding, head, icon, LengthField, name, NumberField, part, tool} from './parts.js';
+import {button, choice, finding, head, icon, LengthField, name, NumberField, part, tool} from './parts.js';
 import {rail} from './rail.js';
 import {EYES, HANDLES, Stage} from './stage.js';
-import {addScene, deleteScene, modelOf, scenesOf, bundleBytes, setScene, state, tellError} from './state.js';
+import {addScene, deleteScene, modelOf, scenesOf, bundleBytes, setModel, setScene, state, tellError} from './state.js';
 import {surfaceOf} from './surface.js';
 import {ModelThumb} from './thumbs.js';
 import {languageName, length, number, said, t} from './words.js';
@@ -345,6 +345,38 @@ export class Scene {
     ];
   }
 
+  /**
+   * The model before and after its repair: the stage draws the one that is chosen.
+   * @param {Studio.Placed} scene
+   */
+  repair({asset}) {
+    if (!asset) return null;
+    const {settings} = state.project;
+    /** @param {string} key */
+    const isSet = (key) => (asset.settings[key] ?? settings[key]) === 'true';
+    /** @type {(key: string, wanted: boolean) => Studio.Values} */
+    const value = (key, wanted) => ({[key]: wanted === (settings[key] === 'true') ? null : wanted});
+    const now = isSet('repair-support') ? 'support' : isSet('repair') ? 'after' : 'before';
+    const done = Object.entries(asset.repair ?? {}).filter(([, {count}]) => count > 0);
+    return m(
+        'details.repair', m('summary', t('repair')),
+        choice(
+            'repair', t('repairShown'),
+            [
+              ['before', t('repairBefore')], ['after', t('repairAfter')],
+              ['support', t('repairSupport')]
+            ],
+            now, (chosen) => setModel(asset.name, {
+                   ...value('repair', chosen === 'after'),
+                   ...value('repair-support', chosen === 'support')
+                 })),
+        m('p.repaired',
+          now !== 'before' && asset.repair &&
+              (done.map(([kind, {count}]) => `${t(`repair.${kind}`)}: ${number(count)}`)
+                   .join(' · ') ||
+               t('repairNothing'))));
+  }
+
   /** @param {Studio.Placed} scene */
   words(scene) {
     const languages = [...new Set([
@@ -444,7 +476,7 @@ export class Scene {
         m('aside.panel',
           m('div.fill', head(name(attrs.pattern.name)), this.models(scenes),
             scene && m('section', m('h2.unseen', t('place')), this.fields(scene)),
-            scene && this.words(scene)),
+            scene && this.repair(scene), scene && this.words(scene)),
           m('div.foot',
             scenes.length > 0 &&
                 m('a.button.primary', {href: '#/try'}, m('span', t('toTry')), icon('next')))));

@@ -215,6 +215,11 @@ export const setScene = (scene, values) => edit((project) => {
  */
 export const setPattern = (name, values) => edit(...changes({table: 'pattern', name}, values));
 /**
+ * @param {string} name
+ * @param {Studio.Values} values
+ */
+export const setModel = (name, values) => edit(...changes({table: 'model', name}, values));
+/**
  * @param {string} pattern
  * @param {string} model
  */

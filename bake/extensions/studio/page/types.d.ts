@@ -47,6 +47,9 @@ declare namespace Studio {
     /** Of its box; null: it was not baked. */
     size: Point | null;
     up: Axis | null;
+    settings: Record<string, string>;
+    /** What the bake repaired, by kind; null: nothing was requested. */
+    repair: Record<string, { count: number; area: number }> | null;
   }
 
   interface Pattern extends Asset {
@@ -88,6 +91,7 @@ declare namespace Studio {
     models: Model[];
     patterns: Pattern[];
     scenes: Scene[];
+    settings: Record<string, string>;
     problems: Wrong[];
     undo: boolean;
     redo: boolean;
