@@ -57,6 +57,11 @@ class Documents(unittest.TestCase):
         self.assertEqual((ROOT / "ISSUES.md").read_text(), printed.stdout,
                          "ISSUES.md is stale: modar check --list-issues > ISSUES.md")
 
+    def test_page_and_packer_agree_on_what_a_page_loads_whole(self):
+        packer = re.search(r"kMostWhole = std::size_t\{(\d+)\} << (\d+);", (ROOT / "bake/extensions/web/packed_bundle.hpp").read_text())
+        page = re.search(r"MOST_BYTES = (\d+) << (\d+);", (ROOT / "runtime/extensions/web/modar-view.js").read_text())
+        self.assertEqual(packer.groups(), page.groups())
+
     def test_each_item_of_the_paper_names_a_test_that_exists(self):
         text = (ROOT / "bake/extensions/lab/README.md").read_text()
         rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if re.match(r"\| \d+ \|", line)]

@@ -5,9 +5,9 @@ import {place} from './arrival.js';
 import {release} from './engine.js';
 
 /**
- * Requests at once. Levels of a chunk have some 10 KB: where an answer takes 0.3 s, this many
- * fill a line of 10 Mbit/s. Over HTTP/1.1, where the browser makes six of them, 6 and 24 show
- * the same (below).
+ * Requests at once. Uncoded levels of a chunk have some 10 KB: where an answer takes 0.3 s, this
+ * many fill a line of 10 Mbit/s; of coded ones MOST_OPEN bytes are the limit. Over HTTP/1.1, where
+ * the browser makes six of them, 6 and 24 show the same (below).
  */
 const MOST_REQUESTS = 24;
 /** Adjacent pieces that are requested together. */
