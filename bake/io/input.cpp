@@ -94,6 +94,9 @@ Result<void> require_kind(FileKind wanted, std::string_view start, const std::st
 
 Result<void> require_kind(FileKind wanted, const std::string& path) {
   std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    if (const auto unread = read_file(path, 16); !unread) return tl::unexpected(unread.error());
+  }
   std::string start(16, '\0');
   file.read(start.data(), static_cast<std::streamsize>(start.size()));
   start.resize(static_cast<std::size_t>(file.gcount()));

@@ -180,6 +180,7 @@ Result<ShapedPicture> load_shaped(const std::string& path, double width_mm,
   const bool told_width = told.top_mm > 0 && told.arc_deg > 0;
   const bool stated = !told_width && !request.corners;
   out.width_mm = width_mm > 0 ? width_mm : stated ? png_width_mm(path) : 0;
+  out.width_of_file = width_mm <= 0 && out.width_mm > 0;
   MODAR_ASSIGN(out.section,
                shape_section(told, out.picture.width, out.picture.height, out.width_mm));
   return out;

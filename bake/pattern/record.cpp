@@ -7,6 +7,7 @@
 #include "bake/pattern/picture.hpp"
 #include "bake/pattern/score.hpp"
 #include "formats/base/path.hpp"
+#include "formats/base/shortest_number.hpp"
 #include "modar/features.hpp"
 #include "modar/pose.hpp"
 
@@ -80,6 +81,13 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
                                   "the picture was made smaller, to " + std::to_string(gray.width) +
                                       "x" + std::to_string(gray.height) + " pixels",
                                   ""});
+  }
+  if (shaped.width_of_file) {
+    report.diagnostics.push_back({"pattern.width", DiagnosticSeverity::kInfo, path, 0,
+                                  "the file states that it is printed " +
+                                      shortest_text(std::round(10.0 * double{shaped.width_mm}) / 10) + " mm wide",
+                                  "if it is not, write the width behind its name, as in " +
+                                      file_stem(path) + ".png:210mm"});
   }
   report_crops(path, shaped, report);
   PatternFeatures out;

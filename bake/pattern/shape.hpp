@@ -52,6 +52,7 @@ Result<std::vector<std::byte>> shape_section(const ShapeRequest& request, int wi
 struct ShapedPicture {
   GrayPicture picture;
   bool shrunk = false;             ///< see load_pattern()
+  bool width_of_file = false;      ///< width_mm is what the PNG states
   std::vector<std::byte> section;  ///< see shape_section()
   double width_mm = 0;
   double corrected = 0;     ///< of a box: see CorrectedBox

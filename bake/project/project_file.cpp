@@ -396,6 +396,14 @@ class ProjectReader {
     return reader.wrong("name", "a name without a slash, which the file gets");
   }
 
+  /// Files are named by it: a second one would overwrite the first.
+  static Result<void> first_of_name(const TableReader& reader, const std::string& name,
+                                    std::set<std::string>& seen) {
+    if (seen.insert(name).second) return {};
+    return reader.refused("name", " = \"" + name + "\"",
+                          {"an earlier table has that name", "give each a name of its own"});
+  }
+
   /// `path` is relative to the project's folder.
   [[nodiscard]] Result<void> keep_inside(const TableReader& reader, const char* key,
                                          const std::string& path) const {
@@ -413,11 +421,13 @@ class ProjectReader {
       MODAR_TRY(reader->parse_settings(project_.settings));
     }
     MODAR_ASSIGN(const auto tiers, whole_.parse_tables("tier"));
+    std::set<std::string> seen;
     for (const TableReader& tier : tiers) {
       MODAR_TRY(tier.allow(keys_with_settings({"name"}, std::nullopt)));
       ProjectTier read;
       MODAR_TRY(tier.take("name", read.name));
       if (!is_plain(read.name)) return wrong_name(tier);
+      MODAR_TRY(first_of_name(tier, read.name, seen));
       MODAR_TRY(tier.parse_settings(read.settings));
       project_.tiers.push_back(std::move(read));
     }
@@ -464,7 +474,12 @@ class ProjectReader {
                             {"without corners = it has no meaning",
                              "state the width alone: the picture tells the height"});
     }
-    if (!parsed) return reader.wrong("corners", "[[212, 80], [905, 131], [870, 640], [190, 602]]");
+    if (!parsed) {
+      return reader.refused("corners", "",
+                            {"they are not four corners in order around the picture",
+                             "write them clockwise from its top left, in pixels of the file: "
+                             "[[212, 80], [905, 131], [870, 640], [190, 602]]"});
+    }
     shape = std::move(*parsed);
     return {};
   }
@@ -752,6 +767,7 @@ class ProjectReader {
 
   Result<void> read_bundles() {
     MODAR_ASSIGN(const auto readers, whole_.parse_tables("bundle"));
+    std::set<std::string> seen;
     for (const TableReader& reader : readers) {
       MODAR_TRY(reader.allow({"name", "models", "patterns"}));
       ProjectBundle bundle;
@@ -759,6 +775,7 @@ class ProjectReader {
       MODAR_TRY(reader.take("models", bundle.models));
       MODAR_TRY(reader.take("patterns", bundle.patterns));
       if (!is_plain(bundle.name)) return wrong_name(reader);
+      MODAR_TRY(first_of_name(reader, bundle.name, seen));
       project_.bundles.push_back(std::move(bundle));
     }
     if (project_.bundles.empty()) project_.bundles.push_back({name_, {}, {}});

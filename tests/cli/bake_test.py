@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import unittest
 
-from programs import COVER, POTTERY, QUICK, ROOT, STATUE, ProgramTest, picture, needs
+from programs import BIN, COVER, POTTERY, QUICK, ROOT, STATUE, ProgramTest, picture, needs
 
 
 class Bake(ProgramTest):
@@ -442,6 +442,24 @@ class BadInput(ProgramTest):
                           "pottery")
         self.assert_fails(self.bake("--model", POTTERY, "--scene", "nonsense"), 1, "PATTERN=MODEL")
         self.assert_nothing_written()
+
+    def test_a_file_that_may_not_be_read_is_not_called_empty(self):
+        self.folder.chmod(0o755)
+        secret = self.folder / "secret.png"
+        shutil.copy(COVER, secret)
+        secret.chmod(0)
+        done = subprocess.run([str(BIN / "modar"), "bake", str(secret), "-o", "/dev/null"], capture_output=True, text=True, cwd="/",
+                              **({"user": "nobody", "group": "nogroup", "extra_groups": []} if os.geteuid() == 0 else {}))
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn("permissions [io.open]", done.stderr)
+
+    def test_a_width_that_a_png_states_is_said(self):
+        stated, silent = self.folder / "stated.png", COVER
+        self.assertEqual(self.modar("pattern", "rectify", COVER, "--corners", "0,0,347,0,347,716,0,716", "--width", "43mm", "-o", stated).returncode, 0)
+        for file, told in ((stated, True), (f"{stated}:210mm", False), (silent, False)):
+            with self.subTest(str(file)):
+                done = self.bake("--pattern", file)
+                self.assertEqual("it is printed 43 mm wide" in done.stderr, told, done.stderr)
 
     def test_two_of_one_name(self):
         (self.folder / "sub").mkdir()

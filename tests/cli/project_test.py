@@ -165,6 +165,10 @@ class Files(ProjectTest):
             ("[[pattern]]\nfile = \"pictures/a.png\"\nwidth = 210\n", "modar.toml:3", "as in \"210mm\"", "project.value"),
             ("[[pattern]]\nfile = \"pictures/a.png\"\nwidth = \"8 inches\"\n", "modar.toml:3", "write 8in", "project.value"),
             ("[[pattern]]\nfile = \"pictures/a.png\"\nheight = \"20cm\"\n", "modar.toml:3", "state the width alone", "project.value"),
+            ("[[pattern]]\nfile = \"pictures/a.png\"\ncorners = [[0, 0], [9, 9], [9, 0], [0, 9]]\n", "modar.toml:3", "clockwise",
+             "project.value"),
+            ("[[tier]]\nname = \"low\"\n[[tier]]\nname = \"low\"\n", "modar.toml:4", "give each a name of its own", "project.value"),
+            ("[[bundle]]\nname = \"low\"\n[[bundle]]\nname = \"low\"\n", "modar.toml:4", "give each a name of its own", "project.value"),
             ("[tier]\nname = \"low\"\n", "modar.toml:1", "[[tier]]", "project.value"),
         ]
         for text, *words in mistakes:

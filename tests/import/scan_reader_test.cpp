@@ -90,6 +90,17 @@ TEST(Stl, BytesBehindTheFacetsAndAMarkBeforeTheTextArePassedOver) {
       "a.stl");
   ASSERT_TRUE(text) << to_line(text.error());
   EXPECT_EQ(text->face_count(), 1u);
+  EXPECT_TRUE(text->diagnostics.empty());
+}
+
+TEST(Stl, TextWithoutItsLastLineMayBeTruncated) {
+  const auto text = parse_stl(
+      "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+      "vertex 0 1 0\nendloop\nendfacet\n",
+      "a.stl");
+  ASSERT_TRUE(text) << to_line(text.error());
+  ASSERT_EQ(text->diagnostics.size(), 1u);
+  EXPECT_EQ(text->diagnostics[0].id, "stl.unfinished");
 }
 
 TEST(ReadModel, ColoursOfVerticesAreSeenAsTheyAre) {

@@ -168,6 +168,7 @@ bool parse_corner(std::string_view line, StlCorner& corner) {
 Result<void> read_text(std::string_view text, const std::string& label, SourceModel& model,
                        PositionIndex& index, Skipped& skipped) {
   std::vector<StlCorner> loop;
+  bool ended = false;
   const auto close_loop = [&] {
     for (std::size_t i = 2; i < loop.size(); ++i) {
       add_facet({loop[0], loop[i - 1], loop[i]}, model, index, skipped);
@@ -180,6 +181,7 @@ Result<void> read_text(std::string_view text, const std::string& label, SourceMo
     text.remove_prefix(std::min(end + 1, text.size()));
     const std::string_view word = next_word(line);
     bool good = true;
+    if (!word.empty()) ended = same_word(word, "endsolid");
     if (same_word(word, "vertex")) {
       good = parse_corner(line, loop.emplace_back());
     } else if (same_word(word, "endloop") || same_word(word, "endfacet")) {
@@ -194,6 +196,11 @@ Result<void> read_text(std::string_view text, const std::string& label, SourceMo
     return fail(ExitCode::kInvalidInput, "stl.text", label + ":" + std::to_string(number),
                 "'" + std::string(word.substr(0, 32)) + "' is not a line of an ASCII STL file",
                 "export the model again, as binary STL, PLY or OBJ");
+  }
+  if (!ended) {
+    model.diagnostics.push_back({"stl.unfinished", DiagnosticSeverity::kWarning, label, 0,
+                                 "the file ends without 'endsolid': it may be truncated",
+                                 "compare its size with the original, or export the model again"});
   }
   return {};
 }
