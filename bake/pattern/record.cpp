@@ -83,11 +83,11 @@ Result<PatternFeatures> bake_pattern(const std::string& path, double width_mm,
                                   ""});
   }
   if (shaped.width_of_file) {
-    report.diagnostics.push_back({"pattern.width", DiagnosticSeverity::kInfo, path, 0,
-                                  "the file states that it is printed " +
-                                      shortest_text(std::round(10.0 * double{shaped.width_mm}) / 10) + " mm wide",
-                                  "if it is not, write the width behind its name, as in " +
-                                      file_stem(path) + ".png:210mm"});
+    report.diagnostics.push_back(
+        {"pattern.width", DiagnosticSeverity::kInfo, path, 0,
+         "the file states that it is printed " +
+             shortest_text(std::round(10.0 * double{shaped.width_mm}) / 10) + " mm wide",
+         "if it is not, write the width behind its name, as in " + file_stem(path) + ".png:210mm"});
   }
   report_crops(path, shaped, report);
   PatternFeatures out;
