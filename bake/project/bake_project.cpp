@@ -13,6 +13,7 @@
 #include <set>
 
 #include "bake/bundle/link_bundles.hpp"
+#include "bake/bundle/scene/scene_nodes.hpp"
 #include "bake/bundle/scene/scene_placement.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/io/terminal.hpp"
@@ -555,6 +556,7 @@ class ProjectBake {
     MODAR_TRY(hold_gates(target, content));
     note_budget(target, described, content);
     for (Diagnostic& alike : alike_patterns(content)) notes_.push_back(std::move(alike));
+    for (Diagnostic& hidden : never_shown(content)) notes_.push_back(std::move(hidden));
     return write(target, content);
   }
 

@@ -137,6 +137,15 @@ class Files(ProjectTest):
             self.assert_fails(self.modar("bake", cwd=self.place), 3, "project.gate")
             self.assertEqual(list((self.place / "out").glob("*")), [])
 
+    def test_what_no_action_shows_is_named(self):
+        scene = ('[bake]\n' + FAST + '[[model]]\nfile = "models/b.obj"\n[[pattern]]\nfile = "pictures/a.png"\n'
+                 '[[scene]]\npattern = "a"\nmodel = "b"\nname = "pot"\nhidden = true\n')
+        action = '[[scene.action]]\non = "found"\ndo = "%s pot"\n'
+        for text, told in ((scene, True), (scene + action % "show", False), (scene + action % "toggle", False), (scene + action % "hide", True)):
+            with self.subTest(text):
+                self.write(text)
+                self.assertEqual("node.never-shown" in self.findings(self.bake()), told)
+
     def test_globs(self):
         (self.place / "models/deep/er").mkdir(parents=True)
         shutil.copy(self.place / "models/b.obj", self.place / "models/deep/er/c.obj")

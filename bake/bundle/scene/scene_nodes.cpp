@@ -427,6 +427,27 @@ Result<void> add_nodes(const BakeRequest& request, BundleContent& content, Repor
   return NodeMaker(request, content, report, source).run();
 }
 
+std::vector<Diagnostic> never_shown(const BundleContent& content) {
+  std::vector<Diagnostic> found;
+  for (std::uint32_t n = 0; n < content.nodes.size(); ++n) {
+    const NodeRecord& node = content.nodes[n];
+    const auto shows = [&](const ActionRecord& action) {
+      const auto command = static_cast<ActionCommand>(action.command);
+      if (command == ActionCommand::kNext) {
+        return node.group != 0 && content.nodes[action.target].group == node.group;
+      }
+      return action.target == n &&
+             (command == ActionCommand::kShow || command == ActionCommand::kToggle);
+    };
+    if ((node.flags & kNodeHidden) == 0 || ranges::any_of(content.actions, shows)) continue;
+    const std::string name = content.names.substr(node.name.offset, node.name.length);
+    found.push_back({"node.never-shown", DiagnosticSeverity::kWarning, name, 0,
+                     "it is hidden, and no action shows it",
+                     "add an action such as do = \"show " + name + "\", or leave hidden out"});
+  }
+  return found;
+}
+
 Json node_texts(const BakeRequest& request) {
   Json nodes = Json::array();
   for (const NodeRequest& node : request.nodes) {

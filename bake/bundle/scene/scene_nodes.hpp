@@ -20,6 +20,9 @@ namespace modar {
 Result<void> add_nodes(const BakeRequest& request, BundleContent& content, Report& report,
                        const MediaSource& source = {});
 
+/// Warnings of hidden nodes that no action shows.
+std::vector<Diagnostic> never_shown(const BundleContent& content);
+
 /// The member `nodes` of the meta text; null where no node has words.
 Json node_texts(const BakeRequest& request);
 
