@@ -16,6 +16,7 @@
 #include "bake/commands/commands.hpp"
 #include "bake/commands/project_command.hpp"
 #include "bake/image/image.hpp"
+#include "bake/import/read_model.hpp"
 #include "bake/io/output.hpp"
 #include "bake/io/terminal.hpp"
 #include "bake/memory/memory_limit.hpp"
@@ -202,15 +203,23 @@ Json bake_json(const BundleView& bundle, const Report& report) {
 /// of it.
 constexpr std::uint64_t kSourceBytesPerBundleByte = 8;
 
-/// Refuses to write over a file that is no bundle by its name and its bytes: textures and material
-/// files, which the models name, are known only later.
+/// Refuses to write over a file that is no bundle by its name and its bytes, since textures and
+/// material files, which the models name, are known only later; and a name of another format.
 Result<void> keep_other_files(const std::string& output) {
   if (output.ends_with(".modar")) return {};
-  return keep_other_kinds(output, "bundle", [](std::string_view start) {
+  MODAR_TRY(keep_other_kinds(output, "bundle", [](std::string_view start) {
     return std::equal(kMagic.begin(), kMagic.end(), start.begin(),
                       start.begin() + std::min(start.size(), kMagic.size()),
                       [](std::uint8_t a, char b) { return a == static_cast<std::uint8_t>(b); });
-  });
+  }));
+  if (!is_picture_file(output) && !is_foreign_picture_file(output) && !is_model_file(output) &&
+      !is_material_file(output)) {
+    return {};
+  }
+  const auto name = std::filesystem::path(output).replace_extension(".modar");
+  return fail(ExitCode::kUsage, "out.name", output,
+              "a bundle is written, and the name is that of another kind of file",
+              "write -o " + name.string());
 }
 
 /// Tries what will be written, before the work.

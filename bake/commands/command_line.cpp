@@ -273,6 +273,9 @@ Error usage_error(const CLI::ParseError& thrown, const CLI::Option* option,
   } else if (dynamic_cast<const CLI::RequiresError*>(&thrown) != nullptr) {
     error.cause = "it needs " + (rules.needs.empty() ? std::string("another option") : rules.needs);
     error.cure = "add it";
+  } else if (option->get_expected_max() == 1 && option->results().size() > 1) {
+    error.cause = "it is given " + std::to_string(option->results().size()) + " times";
+    error.cure = "give it once";
   } else if (value.empty()) {
     error.cause = "its value is missing";
     error.cure = "write " + name + " " + option->get_type_name();

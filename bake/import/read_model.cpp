@@ -69,6 +69,7 @@ bool is_model_file(const std::string& path) {
 }
 
 Result<void> require_model_format(const std::string& path) {
+  if (path.empty()) return tl::unexpected(read_file(path, 0).error());
   if (is_regular_file(path)) MODAR_TRY(require_kind(FileKind::kModel, path));
   if (is_model_file(path)) return {};
   const std::string extension = extension_of(path);

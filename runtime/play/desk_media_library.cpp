@@ -164,6 +164,40 @@ class KeptErrors {
   int kept_;
 };
 
+/// Whether a JPEG without an end marker lacks a scan, which libjpeg does not say. A progressive
+/// one sends the bits of its coefficients in several.
+bool lacks_scans(std::span<const std::uint8_t> jpeg) {
+  std::array<std::array<int, 64>, 256> missing{};  // bits, by component and coefficient
+  for (std::size_t at = 2; at + 4 <= jpeg.size();) {
+    const int marker = jpeg[at + 1];
+    const bool alone = marker <= 1 || (marker >= 0xD0 && marker <= 0xD8) || marker == 0xFF;
+    if (jpeg[at] != 0xFF || alone) {  // within a scan
+      ++at;
+      continue;
+    }
+    if (marker == 0xD9) return false;
+    const std::size_t end = at + 2 + (std::size_t{jpeg[at + 2]} << 8U) + jpeg[at + 3];
+    const bool frame = marker >= 0xC0 && marker <= 0xC2;
+    const bool scan = marker == 0xDA;
+    const std::size_t list = at + (frame ? 10 : 5);
+    const std::size_t step = frame ? 3 : 2;
+    if ((frame || scan) && list < jpeg.size()) {
+      const std::size_t last = list + step * jpeg[list - 1];
+      if (last + 3 > jpeg.size()) return true;
+      for (std::size_t i = list; i < last; i += step) {
+        if (frame) missing[jpeg[i]].fill(1);
+        for (int k = jpeg[last]; scan && k <= std::min<int>(jpeg[last + 1], 63); ++k) {
+          missing[jpeg[i]][static_cast<std::size_t>(k)] = jpeg[last + 2] & 15;
+        }
+      }
+    }
+    at = end;
+  }
+  return std::ranges::any_of(missing, [](const auto& component) {
+    return std::ranges::any_of(component, [](int bits) { return bits > 0; });
+  });
+}
+
 /// Decodes a picture, and says whether pixels of a JPEG are lost: by the same warnings of libjpeg
 /// as bake/image/jpeg.cpp.
 cv::Mat decode(std::span<const std::byte> file, bool& lost) {
@@ -177,6 +211,7 @@ cv::Mat decode(std::span<const std::byte> file, bool& lost) {
   constexpr std::array<std::string_view, 3> kLost = {"premature end of data", "bad Huffman code",
                                                      "instead of RST"};
   lost = std::ranges::any_of(kLost, [&](auto words) { return said.find(words) != said.npos; });
+  lost = lost || (bytes.front() == 0xFF && lacks_scans(std::span(bytes).first(file.size())));
   return picture;
 }
 
@@ -204,6 +239,7 @@ Result<void> read_picture(const std::string& path, Frame& frame) {
                    printable(path).c_str(), picture.cols, picture.rows, reduced.cols, reduced.rows);
       picture = reduced;
     }
+    frame.reduced = std::max(1.0, 1 / scale);
     fill(frame, picture);
   } catch (const std::exception& error) {
     return damaged(path, std::string("OpenCV: ") + error.what());

@@ -155,6 +155,14 @@ void detection(JsonText& writer, const Detection& seen, std::span<const std::str
   writer.close('}');
 }
 
+/// In pixels of the file, of a frame that was reduced.
+FrameReport in_file(FrameReport report) {
+  for (Detection& seen : report.visible) {
+    for (glm::dvec2& corner : seen.corners) corner = report.reduced * (corner + 0.5) - 0.5;
+  }
+  return report;
+}
+
 void camera(JsonText& writer, const CameraReport& camera) {
   object(writer, "camera", [&] {
     rounded(writer, "focal_px", camera.focal.focal);
@@ -205,8 +213,9 @@ const char* to_string(Shown state) {
   return kNames[static_cast<std::size_t>(state)];
 }
 
-std::string frame_line(const FrameReport& report, std::span<const std::string> pattern_names,
+std::string frame_line(const FrameReport& frame, std::span<const std::string> pattern_names,
                        bool homographies) {
+  const FrameReport report = in_file(frame);
   return json_line([&](JsonText& writer) {
     count(writer, "frame", report.frame);
     number(writer, "time_s", report.time_s);

@@ -58,10 +58,11 @@ struct SceneState {
 struct FrameReport {
   std::uint64_t frame = 0;
   double time_s = 0;
+  double reduced = 1;              ///< Frame::reduced
   std::vector<Detection> visible;  ///< measured in this frame, whether shown or not
   Reason reason = Reason::kNoFeatures;
   Shown state = Shown::kHidden;
-  CameraReport camera;
+  CameraReport camera;  ///< in pixels of the file
   StageTimes ms{};
   const SceneState* scene = nullptr;  ///< of the frame; null: nothing acts
 
@@ -126,7 +127,7 @@ bool draws_in_software(std::string_view gl_renderer);
 /// that are not finite become null. No newline at the end. pattern_names: by the bundle's pattern
 /// index. homographies: adds each pattern's `homography`, row by row, from its unit square (0, 0
 /// its top left corner, 1, 1 its bottom right one) to the frame's pixels; null where its corners
-/// have none.
+/// have none. Corners and homographies are in pixels of the file.
 std::string frame_line(const FrameReport& report, std::span<const std::string> pattern_names,
                        bool homographies = false);
 

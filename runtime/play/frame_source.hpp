@@ -22,6 +22,7 @@ struct Frame {
   bool new_scene = false;       ///< of stills: it does not continue the frame before
   int width = 0;
   int height = 0;
+  double reduced = 1;                          ///< a pixel's side, in pixels of the file
   PictureFormat format = PictureFormat::kRgb;  ///< kRgb: the picture is in rgb, else in yuv
   bool full_range = true;                      ///< of yuv: luma from 0 to 255
   std::vector<std::uint8_t> yuv;   ///< planes as the camera gave them, sides even; the GPU converts

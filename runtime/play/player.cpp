@@ -221,12 +221,14 @@ FrameReport Player::begin_report(const Job& job) {
   FrameReport report;
   report.frame = job.frame.index;
   report.time_s = job.frame.time_s;
+  report.reduced = job.frame.reduced;
   for (const Detection& seen : job.track.visible) {
     if (spot_ || controls_.wants(seen.pattern)) report.visible.push_back(seen);
   }
   report.reason = job.track.reason;
   report.camera = {job.track.camera, setup_.camera.fx > 0};
-  report.camera.focal.focal = job.camera.fx;
+  report.camera.focal.focal = job.camera.fx * job.frame.reduced;
+  report.camera.focal.sigma *= job.frame.reduced;
   report.at(Stage::kRead) = job.frame.read_ms;
   report.at(Stage::kDetect) = job.track.times.detect;
   report.at(Stage::kDescribe) = job.track.times.describe;
@@ -322,7 +324,9 @@ Result<void> Player::write_line(const FrameReport& report, const Frame& frame) {
   const std::string line = frame_line(report, names_, options_.homography);
   for (const auto& sink : sinks_) MODAR_TRY(sink->line(report, line));
   if (recorder_) {
-    MODAR_TRY(recorder_->add(frame, line));
+    FrameReport recorded = report;
+    recorded.reduced = 1;  // the recording has the reduced picture
+    MODAR_TRY(recorder_->add(frame, frame_line(recorded, names_, options_.homography)));
   }
   return options_.json ? print_line(line) : Result<void>{};
 }

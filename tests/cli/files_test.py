@@ -84,6 +84,16 @@ class Inputs(ProgramTest):
         self.assertEqual(status.read_text(), thesis)
         self.assert_fails(self.modar("inspect", bundle, "--extract", status), 2, "Not a directory")
 
+    def test_a_bundle_has_no_name_of_another_format(self):
+        for name in ("d.png", "d.JPG", "d.heic", "d.obj", "d.glb", "d.mtl"):
+            done = self.modar("bake", COVER, "-o", self.folder / name)
+            self.assert_fails(done, 1, "out.name", "write -o " + str(self.folder / "d.modar"))
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_an_empty_name_is_said(self):
+        for words in (["--model", ""], ["--pattern", ""], [""]):
+            self.assert_fails(self.modar("bake", *words, "-o", self.folder / "o.modar"), 2, "the name of a file is empty")
+
     def test_pictures_beside_patterns(self):
         path, _ = self.aliases(COVER)
         self.assert_kept(path, self.modar("pattern", "score", path, "--overlay", "."))

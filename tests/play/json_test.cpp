@@ -71,6 +71,13 @@ TEST(JsonLines, TheHomographyTakesTheUnitSquareToTheCorners) {
   EXPECT_TRUE(json::parse(frame_line(report, {}, true))["visible"][0]["homography"].is_null());
 }
 
+TEST(JsonLines, CornersOfAReducedStillAreInPixelsOfItsFile) {
+  FrameReport report = seen_frame();
+  report.reduced = 2;  // pixels have their centres at whole numbers: 0 of the still is 0.5
+  EXPECT_EQ(json::parse(frame_line(report, {}))["visible"][0]["corners"],
+            json({{1.5, 3.0}, {200.5, 4.5}, {202.5, 198.5}, {-5.5, 196.5}}));
+}
+
 TEST(JsonLines, WhatThePoseDoesNotExplainIsWrittenByRows) {
   FrameReport report = seen_frame();
   EXPECT_FALSE(json::parse(frame_line(report, {}))["visible"][0].contains("stretch"));

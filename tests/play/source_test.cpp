@@ -124,6 +124,24 @@ TEST(Source, AJpegOfWhichAPartIsMissingIsSaid) {
   }
 }
 
+TEST(Source, AProgressiveJpegOfWhichAScanIsMissingIsSaid) {
+  const test::Folder folder;
+  cv::Mat noise(64, 64, CV_8UC3);
+  cv::randu(noise, 0, 255);
+  cv::imwrite(folder / "a.jpg", noise, {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
+  const std::string whole = test::read_text(folder / "a.jpg");
+  int scans = 0;
+  for (auto at = whole.find("\xFF\xDA"); at != whole.npos; at = whole.find("\xFF\xDA", at + 2)) {
+    if (++scans == 1) continue;
+    // libjpeg does not say that the file ends here, between two scans.
+    test::write_text(folder / "b.jpg", whole.substr(0, at));
+    Frame frame;
+    EXPECT_NE(said_of(folder / "b.jpg", frame).find("a part of the picture is missing"), whole.npos)
+        << scans;
+  }
+  EXPECT_GT(scans, 5);
+}
+
 TEST(Source, AVideoOfWhichAPartIsMissingIsSaid) {
   const test::Folder folder;
   const std::string path = folder / "v.avi";
@@ -159,6 +177,7 @@ TEST(Source, AHugeStillIsReduced) {
             "modar-play: " + (folder / "a.png") + ": reduced from 6000x4000 to 4330x2887 pixels\n");
   ASSERT_EQ(frame.width, 4330);  // the sides keep their ratio: 12.5 million pixels at 3:2
   ASSERT_EQ(frame.height, 2887);
+  EXPECT_NEAR(frame.reduced, 6000.0 / 4330, 1e-3);
   const std::uint8_t* row = &frame.rgb[std::size_t{3} * 4330 * 1000];
   EXPECT_NEAR(row[3 * 2160], 240, 1);
   EXPECT_NEAR(row[3 * 2169], 40, 1);
