@@ -45,6 +45,8 @@ constexpr double kLeastSharp = 0.6;
 // Of a figure around the one that was chosen, which makes that doubtful.
 constexpr double kSheetSupport = 0.6;
 constexpr double kSheetLeast = 1.04;
+// Share of its own edges that is sharp.
+constexpr double kSheetSharp = 0.5;
 // Share of a figure that another object on it has. A print's own picture has more, a logo less.
 constexpr double kLeastHeld = 0.05;
 constexpr double kMostHeld = 0.52;
@@ -514,10 +516,15 @@ double sharp_along(const Gradients& gradients, const Point& from, const Point& t
   return static_cast<double>(sharp) / kPlaces;
 }
 
-double least_sharp(const Gradients& gradients, const std::array<Point, 4>& corners) {
+/// Of that many parts of each side, the least.
+double least_sharp(const Gradients& gradients, const std::array<Point, 4>& corners, int parts = 1) {
   double least = 1;
   for (std::size_t i = 0; i < 4; ++i) {
-    least = std::min(least, sharp_along(gradients, corners[i], corners[(i + 1) % 4]));
+    const Point part = (corners[(i + 1) % 4] - corners[i]) / parts;
+    for (int k = 0; k < parts; ++k) {
+      const Point from = corners[i] + k * part;
+      least = std::min(least, sharp_along(gradients, from, from + part));
+    }
   }
   return least;
 }
@@ -622,15 +629,60 @@ bool around(const std::array<Point, 4>& outer, const std::array<Point, 4>& inner
   return true;
 }
 
+/// Of the edges that a figure around another has for itself, the share of the worst that is sharp.
+/// The edges of a table and the print's own, continued, make figures around a print: there the
+/// continued parts show nothing.
+double own_edges(const Gradients& gradients, const std::array<Point, 4>& outer,
+                 std::array<Point, 4> inner) {
+  constexpr double kShared = 3;  // pixels, of one edge that is a side of both figures
+  const auto nearest =
+      std::min_element(inner.begin(), inner.end(), [&](const Point& a, const Point& b) {
+        return norm_of(a - outer[0]) < norm_of(b - outer[0]);
+      });
+  std::rotate(inner.begin(), nearest, inner.end());
+  double least = 1;
+  bool own = false;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Point& from = outer[i];
+    const Point& to = outer[(i + 1) % 4];
+    const Point& start = inner[i];
+    const Point& end = inner[(i + 1) % 4];
+    const Point along = (to - from) / norm_of(to - from);
+    const double off =
+        std::max(std::fabs(cross(along, start - from)), std::fabs(cross(along, end - from)));
+    const auto look = [&](const Point& one, const Point& other) {
+      if ((other - one).dot(along) <= kBeyondFrom) return;
+      own = true;
+      least = std::min(least, sharp_along(gradients, one, other));
+    };
+    if (off > kShared) {
+      look(from, to);
+    } else {
+      look(from, start);
+      look(end, to);
+    }
+  }
+  return own ? least : 0;
+}
+
 /// Whether another figure of edges, with less contrast, surrounds one: the sheet, perhaps, on
 /// which that is printed.
-bool framed(const std::vector<Figure>& figures, const std::array<Point, 4>& corners) {
+bool framed(const Gradients& gradients, const std::vector<Figure>& figures,
+            const std::array<Point, 4>& corners) {
+  constexpr int kMost = 100;  // figures that are measured, the best first
   const double area = area_of(corners);
-  return std::any_of(figures.begin(), figures.end(), [&](const Figure& other) {
+  int measured = 0;
+  for (const Figure& other : figures) {
     const double larger = area_of(other.corners) / area;
-    return other.support >= kSheetSupport && larger > kSheetLeast && larger < kMostMargin &&
-           around(other.corners, corners);
-  });
+    if (other.support < kSheetSupport || larger < kSheetLeast || larger > kMostMargin ||
+        !around(other.corners, corners)) {
+      continue;
+    }
+    const std::array<Point, 4> outer = refine(gradients, other.corners, {2.5, 1.2});
+    if (own_edges(gradients, outer, corners) > kSheetSharp) return true;
+    if (++measured == kMost) break;
+  }
+  return false;
 }
 
 /// Whether the two edges that end at a side continue beyond it, as those of a longer object do.
@@ -791,6 +843,48 @@ bool bordered(const Gradients& gradients, const std::array<Point, 4>& corners) {
   return both(0, 2) && both(1, 3);
 }
 
+/// Whether a band of one colour is around a figure, as wide above it as below and as wide on its
+/// left as on its right: a border or a margin. A table's colour reaches further.
+bool within_band(const cv::Mat& rgb, const std::array<Point, 4>& corners) {
+  constexpr int kPlaces = 40;          // of a side
+  constexpr double kSame = 16;         // steps of a colour channel
+  constexpr double kUniform = 0.9;     // share of a side's places next to it with the band's colour
+  constexpr double kEnded = 0.4;       // the same where the band has ended
+  constexpr double kEqualRatio = 1.5;  // most ratio of two widths that are equal
+  const cv::Matx33d plane = plane_of(corners);
+  const auto colour = [&](std::size_t side, double off, int place) {
+    const double along = 0.05 + 0.9 * place / (kPlaces - 1);
+    const double x = side % 2 == 0 ? along : side == 1 ? 1 + off : -off;
+    const double y = side % 2 == 1 ? along : side == 2 ? 1 + off : -off;
+    const Point at = on_plane(plane, x, y);
+    const int column = std::clamp(static_cast<int>(std::lround(at.x)), 0, rgb.cols - 1);
+    const int row = std::clamp(static_cast<int>(std::lround(at.y)), 0, rgb.rows - 1);
+    return cv::Vec3d(rgb.at<cv::Vec3b>(row, column));
+  };
+  cv::Vec3d mean;
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (int k = 0; k < kPlaces; ++k) mean += colour(i, kNearBorder, k) / (4.0 * kPlaces);
+  }
+  const auto share = [&](std::size_t side, double off) {
+    int same = 0;
+    for (int k = 0; k < kPlaces; ++k) {
+      same += cv::norm(colour(side, off, k) - mean, cv::NORM_INF) < kSame ? 1 : 0;
+    }
+    return 1.0 * same / kPlaces;
+  };
+  std::array<double, 4> width{};
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (share(i, kNearBorder) < kUniform) return false;
+    width[i] = kNearBorder;
+    while (width[i] < kFarBorder && share(i, width[i]) > kEnded) width[i] += 0.005;
+    if (width[i] >= kFarBorder) return false;
+  }
+  const auto equal = [&](double one, double other) {
+    return std::max(one, other) < kEqualRatio * std::min(one, other);
+  };
+  return equal(width[0], width[2]) && equal(width[1], width[3]);
+}
+
 /// Printed frames are inside an object's own edges: the largest figure around the best one that has
 /// nearly its contrast.
 const Figure& outermost(const std::vector<Figure>& figures) {
@@ -908,12 +1002,14 @@ Result<FoundCorners> search(const RgbaImage& photo) {
                      : seen  ? "no four-sided figure stands out sharply in the photo"
                              : "no four-sided figure stands out in the photo");
   }
+  found.quarter = least_sharp(gradients, corners, 4);
   found.fills = area_of(corners) > kFilled * small.cols * small.rows;
-  found.framed = framed(figures, corners) || (!found.fills && goes_on(gradients, corners));
+  found.framed =
+      framed(gradients, figures, corners) || (!found.fills && goes_on(gradients, corners));
   found.rivalled = object.rivalled();
   found.holds =
       holds_another(small, gradients, corners) || holds_a_figure(gradients, figures, corners);
-  found.bordered = bordered(gradients, corners);
+  found.bordered = bordered(gradients, corners) || within_band(small, corners);
   const double fine = std::max(1.0, std::max(rgb.cols, rgb.rows) / kRefineSide);
   if (fine > 1) cv::resize(rgb, rgb, cv::Size(), 1 / fine, 1 / fine, cv::INTER_AREA);
   const double step = scale / fine;

@@ -15,17 +15,19 @@ namespace modar {
 inline constexpr double kDoubtfulSharpness = 0.92;
 /// Of sides that divide an object from its background, and of their sharpness then.
 inline constexpr double kClear = 0.8;
-inline constexpr double kClearEdge = 0.85;
+inline constexpr double kClearEdge = 0.9;
 /// Of sides that divide an object from a background with edges around it.
 inline constexpr double kClearFramed = 0.95;
-/// Of sides that the background tells nothing of: below, they may be a shadow's.
-inline constexpr double kSureAlone = 0.98;
+/// Of each quarter of sides that the background tells nothing of: below, one of their ends may be
+/// on another edge.
+inline constexpr double kSureQuarter = 0.86;
 
 struct FoundCorners {
   std::array<PixelPoint, 4> corners{};  ///< top-left, top-right, bottom-right, bottom-left
   /// Share of the weakest side where the edge is sharp, 0 to 1; below kDoubtfulSharpness the figure
   /// may be another object's, or a corner is hidden.
   double sharpness = 0;
+  double quarter = 0;  ///< the same of the weakest quarter of a side
   /// Share of the weakest side on which the foreground ends, 0 to 1.
   double divided = 0;
   bool rivalled = false;  ///< another object of its size has contrast
@@ -40,8 +42,8 @@ struct FoundCorners {
   /// Why they may be wrong: "blurred", "framed", "rivalled" or "fills"; empty: they are sure.
   [[nodiscard]] const char* doubt() const {
     if (holds || (clear() && rivalled)) return "rivalled";
-    const double least = divided > 0 ? kDoubtfulSharpness : kSureAlone;
-    if (!clear() && sharpness < least) return "blurred";
+    const bool sharp = divided > 0 ? sharpness >= kDoubtfulSharpness : quarter >= kSureQuarter;
+    if (!clear() && !sharp) return "blurred";
     if (bordered || (framed && !(clear() && divided >= kClearFramed))) return "framed";
     return fills ? "fills" : "";
   }

@@ -284,6 +284,36 @@ TEST(FindPicture, TheInsideOfABlackBorderIsDoubted) {
   EXPECT_EQ(alarms, 0);
 }
 
+TEST(FindPicture, LinesOfATableThatContinueAPrintAreNoSheet) {
+  const Corners corners = {
+      {{250.3f, 150.6f}, {720.2f, 120.4f}, {760.8f, 560.1f}, {220.7f, 520.9f}}};
+  // With three sides of the print, the edge of a board next to it makes a figure around the print.
+  cv::Mat table = backdrop("survey.png") * 0.4;
+  cv::line(table, {850, 60}, {905, 640}, cv::Scalar(200, 210, 220), 9, cv::LINE_AA);
+  for (const char* pattern : {"mural.png", "game.png"}) {
+    for (const int how : {0, 1}) {
+      const Verdict one =
+          verdict(photograph(printed(asset(pattern), how), table, corners), corners);
+      EXPECT_TRUE(one.good) << pattern << " printed " << how;
+      EXPECT_FALSE(one.doubted) << pattern << " printed " << how;
+    }
+  }
+}
+
+TEST(FindPicture, ABorderWhoseEdgeAShadowHidesIsDoubted) {
+  const Corners corners = {
+      {{250.3f, 150.6f}, {720.2f, 120.4f}, {760.8f, 560.1f}, {220.7f, 520.9f}}};
+  for (const int ground : {50, 64}) {
+    cv::Mat pattern = asset("painting.png");
+    const int border = pattern.cols / 6;
+    cv::copyMakeBorder(pattern, pattern, border, border, border, border, cv::BORDER_CONSTANT,
+                       cv::Scalar(34, 34, 34));
+    const cv::Mat table(720, 960, CV_8UC3, cv::Scalar(ground, ground, ground + 2));
+    EXPECT_FALSE(verdict(photograph(pattern, shaded(table, corners), corners), corners).silent)
+        << ground;
+  }
+}
+
 TEST(FindPicture, AFileThatIsThePictureStaysWhole) {
   for (const char* name :
        {"cover.png", "game.png", "mural.png", "painting.png", "poems.png", "survey.png"}) {
