@@ -110,6 +110,25 @@ struct MeshDefects {
   [[nodiscard]] DefectCount& of(Defect defect) { return counts[static_cast<std::size_t>(defect)]; }
 };
 
+/// What became of the things of one kind that a model's file names: used unchanged, used in another
+/// form, left out.
+struct Fate {
+  std::uint64_t used = 0;
+  std::uint64_t changed = 0;
+  std::uint64_t left_out = 0;
+};
+
+/// An account of all that a model's file names.
+struct Account {
+  std::string model;  ///< its name
+  Fate images;        ///< maps of materials, and images that no material names
+  Fate colours;       ///< of materials; changed: a gray that multiplies no picture
+  Fate faces;         ///< changed: polygons that became triangles
+  Fate nodes;         ///< of a glTF scene; changed: posed by a skin
+  Fate animations;
+  Fate attributes;  ///< of vertices; of glTF, each primitive's
+};
+
 /// What a model's levels of detail are off by, the worst of all.
 struct LevelFigures {
   double position_error_max = 0;   ///< source units: bounds the distance from level 0
@@ -123,6 +142,7 @@ struct Report {
   std::vector<MeshTopology> topologies;  ///< one a model, where requested
   std::vector<MeshDefects> defects;      ///< one a model, after its repair
   std::vector<MeshDefects> repairs;      ///< one a model, where requested
+  std::vector<Account> accounts;         ///< one a model
   std::vector<LevelFigures> levels;      ///< one a model, where levels were requested
   std::vector<Upright> uprights;         ///< one a model
   ProgressCallback progress;             ///< may be empty

@@ -189,8 +189,21 @@ Json bake_json(const BundleView& bundle, const Report& report) {
     json.set("model", one.model);
     return json;
   });
+  const auto fate = [](const Fate& one) -> Json {
+    return {{"used", one.used}, {"changed", one.changed}, {"left_out", one.left_out}};
+  };
+  const Json account = Json::list(report.accounts, [&](const Account& one) -> Json {
+    return {{"model", one.model},
+            {"images", fate(one.images)},
+            {"colours", fate(one.colours)},
+            {"faces", fate(one.faces)},
+            {"nodes", fate(one.nodes)},
+            {"animations", fate(one.animations)},
+            {"attributes", fate(one.attributes)}};
+  });
   const ProcessCost cost = process_cost();
   return {{"bundle", bundle_json(bundle)},
+          {"account", account},
           {"half_edges", half_edges},
           {"defects", defects},
           {"stages", stages},

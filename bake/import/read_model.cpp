@@ -2,6 +2,7 @@
 #include "bake/import/read_model.hpp"
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 
 #include "bake/import/conversion.hpp"
@@ -44,6 +45,25 @@ Result<SourceModel> read_format(const std::string& path, const ReadOptions& opti
   return fail(ExitCode::kInternal, "modar.bug", path, "a format without a reader", "report it");
 }
 
+/// Of formats whose materials and attributes are as the model has them.
+void account_for(SourceModel& model) {
+  Account& account = model.account;
+  for (const SourceMaterial& m : model.materials) {
+    account.images.used += m.diffuse_map.empty() ? 0u : 1u;
+    account.images.changed += m.normal.path.empty() ? 0u : 1u;
+    account.colours.changed += m.whitened ? 1u : 0u;
+  }
+  for (const Diagnostic& d : model.diagnostics) {
+    constexpr std::array<std::string_view, 3> kLost = {"mtl.missing-map", "mtl.emission-map",
+                                                       "mtl.opacity-map"};
+    account.images.left_out += std::find(kLost.begin(), kLost.end(), d.id) != kLost.end() ? 1u : 0u;
+  }
+  account.colours.used = model.materials.size() - account.colours.changed;
+  account.attributes.used = 1u + (model.corner_uvs.kind != IndexPlane::Kind::kAbsent ? 1u : 0u) +
+                            (model.corner_normals.kind != IndexPlane::Kind::kAbsent ? 1u : 0u) +
+                            (model.colours.empty() ? 0u : 1u);
+}
+
 }  // namespace
 
 bool ModelFolder::has(const std::string& file) const {
@@ -82,6 +102,7 @@ Result<void> require_model_format(const std::string& path) {
 Result<SourceModel> read_model(const std::string& path, const ReadOptions& options) {
   MODAR_TRY(require_model_format(path));
   MODAR_ASSIGN(SourceModel model, read_format(path, options));
+  if (format_of(extension_of(path)) != Format::kGltf) account_for(model);
   for (SourceMaterial& m : model.materials) {
     // Clay is for what has no colour: those of vertices are seen unchanged.
     const bool clay = m.diffuse_map.empty() && m.diffuse == glm::vec3(kClay);

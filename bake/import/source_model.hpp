@@ -58,6 +58,7 @@ struct SourceMaterial {
   MapPlace place;  ///< of the diffuse map; readers apply it to the uvs
   NormalMap normal;
   bool two_sided = false;
+  bool whitened = false;     ///< its file states a gray for its picture, which is shown unchanged
   bool see_through = false;  ///< its picture has alpha; unknown (false) until it has been read
   /// Named "occluder": represents a real object, hides content behind it and is invisible itself.
   [[nodiscard]] bool occluder() const { return name == "occluder"; }
@@ -113,6 +114,7 @@ struct SourceModel {
   std::vector<SourceMaterial> materials;
   std::vector<Diagnostic> diagnostics;
   std::uint64_t lost_faces = 0;  ///< that the file states and the reader could not use
+  Account account;               ///< weld() adds faces and unused materials
   /// Other files that the model's own one names, those that are missing too; maps are in the
   /// materials, and here where they are missing.
   std::vector<std::string> files;

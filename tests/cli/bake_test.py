@@ -1,10 +1,17 @@
 """`modar bake` and `modar check`: the same bytes always, errors that help, nothing half-written."""
+import base64
 import itertools
 import json
 import os
 import shutil
+import struct
 import subprocess
 import unittest
+
+try:
+    import jsonschema
+except ImportError:
+    jsonschema = None
 
 from programs import BIN, COVER, POTTERY, QUICK, ROOT, STATUE, ProgramTest, picture, needs
 
@@ -197,6 +204,38 @@ class Bake(ProgramTest):
         self.assertEqual(alone["bundle"]["models"][0]["repair"], done)
         self.assertIn("model.no-support", [finding["id"] for finding in alone["findings"]])
         self.assertEqual(self.modar("check", out, "--source", model).returncode, 0)
+
+    def account(self, model):
+        report = self.modar_json("bake", "--model", model, "--no-lods", "--no-occlusion", "-o", self.folder / "account.modar")
+        schema = json.loads((ROOT / "bake" / "commands" / "bake.schema.json").read_text())
+        if jsonschema:
+            jsonschema.validate(report, schema)
+        return {kind: tuple(fate[key] for key in ("used", "changed", "left_out")) for kind, fate in report["account"][0].items() if kind != "model"}
+
+    def test_all_that_a_file_names_is_accounted_for(self):
+        picture(self.folder / "a.png")
+        (self.folder / "m.mtl").write_text("newmtl a\nKd .6 .6 .6\nmap_Kd a.png\nnewmtl b\nKd 1 0 0\nmap_Kd gone.png\nnewmtl unused\nKd 0 1 0\n")
+        (self.folder / "m.obj").write_text("mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1 4/1\nusemtl b\n"
+                                           "f 1/1 2/1 4/1\nf 2/1 3/1 4/1\nf 1/1 3/1 4/1\nf 1/1 2/1 9/1\n")
+        self.assertEqual(self.account(self.folder / "m.obj"), {
+            "images": (1, 0, 1), "colours": (1, 1, 1), "faces": (3, 1, 1), "nodes": (0, 0, 0), "animations": (0, 0, 0), "attributes": (2, 0, 0)})
+        data = struct.pack("<27f", 0, 0, 0, 1, 0, 0, 0, 1, 1, *[0] * 18)
+        view = {"bufferView": 0, "componentType": 5126, "count": 3}
+        images = [{"uri": "a.png", "name": name} for name in ("shown", "merged", "unnamed")]
+        (self.folder / "m.gltf").write_text(json.dumps({
+            "asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1]}], "extensionsUsed": ["KHR_node_visibility"],
+            "nodes": [{"mesh": 0}, {"mesh": 1, "extensions": {"KHR_node_visibility": {"visible": False}}}, {}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1, "TEXCOORD_1": 1, "TANGENT": 2}, "material": 0}]},
+                       {"primitives": [{"attributes": {"POSITION": 0}, "material": 1}]}],
+            "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 1}}}, {}],
+            "textures": [{"source": 0}, {"source": 1}], "images": images,
+            "animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path": "scale"}}], "samplers": [{"input": 3, "output": 0}]}],
+            "buffers": [{"byteLength": len(data), "uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode()}],
+            "bufferViews": [{"buffer": 0, "byteLength": len(data)}],
+            "accessors": [{**view, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]}, {**view, "type": "VEC2"}, {**view, "type": "VEC4"},
+                          {**view, "type": "SCALAR"}]}))
+        self.assertEqual(self.account(self.folder / "m.gltf"), {
+            "images": (1, 1, 1), "colours": (1, 0, 1), "faces": (1, 0, 0), "nodes": (1, 0, 2), "animations": (0, 0, 1), "attributes": (2, 0, 3)})
 
     def test_models_only_and_patterns_only_are_legal(self):
         picture(self.folder / "picture.png")

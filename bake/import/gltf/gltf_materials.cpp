@@ -213,6 +213,21 @@ class MaterialReader {
     return m;
   }
 
+  /// Images of the file: of base colours, in other maps that were merged, and those not read.
+  [[nodiscard]] Fate images() const {
+    std::vector<bool> shown(paths_.size(), false);
+    for (const tinygltf::Material& m : gltf_.materials) {
+      const int image = image_of(m.pbrMetallicRoughness.baseColorTexture.index);
+      if (image >= 0) shown[static_cast<std::size_t>(image)] = true;
+    }
+    Fate fate;
+    for (std::size_t i = 0; i < paths_.size(); ++i) {
+      const bool read = paths_[i] && !paths_[i]->empty();
+      ++(!read ? fate.left_out : shown[i] ? fate.used : fate.changed);
+    }
+    return fate;
+  }
+
   /// Adds one finding for each kind of thing that was folded or left out.
   void report() {
     const auto add = [&](const char* id, int count, const char* what) {
@@ -375,10 +390,16 @@ class MaterialReader {
     return static_cast<float>(stored_light(factor(factors, static_cast<std::size_t>(i), other)));
   }
 
-  std::string image_path(int texture) {
-    if (texture < 0 || static_cast<std::size_t>(texture) >= gltf_.textures.size()) return {};
+  /// A texture's image; -1 if none.
+  [[nodiscard]] int image_of(int texture) const {
+    if (texture < 0 || static_cast<std::size_t>(texture) >= gltf_.textures.size()) return -1;
     const int source = source_of(gltf_.textures[static_cast<std::size_t>(texture)]);
-    if (source < 0 || static_cast<std::size_t>(source) >= gltf_.images.size()) return {};
+    return source < 0 || static_cast<std::size_t>(source) >= gltf_.images.size() ? -1 : source;
+  }
+
+  std::string image_path(int texture) {
+    const int source = image_of(texture);
+    if (source < 0) return {};
     const auto index = static_cast<std::size_t>(source);
     if (!paths_[index]) paths_[index] = as_stored(find_image(gltf_.images[index], index));
     return *paths_[index];
@@ -487,12 +508,13 @@ bool keep_image_bytes(tinygltf::Image* image, int, std::string*, std::string*, i
 std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const ModelFolder& folder,
                                            const std::string& label,
                                            std::vector<Diagnostic>& diagnostics,
-                                           std::vector<MetalMap>& metal_maps) {
+                                           std::vector<MetalMap>& metal_maps, Fate& images) {
   MaterialReader reader(gltf, folder, label, diagnostics);
   std::vector<SourceMaterial> materials;
   for (const tinygltf::Material& m : gltf.materials) materials.push_back(reader.read(m));
   materials.emplace_back();
   reader.report();
+  images = reader.images();
   metal_maps = reader.metal_maps();
   return materials;
 }

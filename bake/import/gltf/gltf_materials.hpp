@@ -29,10 +29,11 @@ void use_metallic_roughness(tinygltf::Model& gltf);
 /// Findings state merged and omitted parts.
 /// folder: where image names are looked up, with a trailing slash. label: the file's name in
 /// diagnostics. metal_maps: those that apply_metal_maps() is yet to apply.
+/// images: receives the account of maps, and of images that no material names.
 std::vector<SourceMaterial> gltf_materials(const tinygltf::Model& gltf, const ModelFolder& folder,
                                            const std::string& label,
                                            std::vector<Diagnostic>& diagnostics,
-                                           std::vector<MetalMap>& metal_maps);
+                                           std::vector<MetalMap>& metal_maps, Fate& images);
 
 /// KHR_texture_transform of the base colour: uv of the file to those of the image, v down in both.
 struct GltfUv {

@@ -55,6 +55,36 @@ class SceneReader {
 
   [[nodiscard]] const LeftOut& left_out() const { return left_out_; }
 
+  /// Counts what the scene uses of the file, see Account.
+  void account() {
+    Account& account = model_.account;
+    account.colours.used = gltf_.materials.size();
+    account.animations.left_out = gltf_.animations.size();
+    std::vector<bool> drawn(gltf_.meshes.size(), false);
+    for (std::size_t i = 0; i < seen_.size(); ++i) {
+      const tinygltf::Node& node = gltf_.nodes[i];
+      const bool used = seen_[i] && !is_hidden(node);
+      ++(!used            ? account.nodes.left_out
+         : node.skin >= 0 ? account.nodes.changed
+                          : account.nodes.used);
+      const auto mesh = static_cast<std::size_t>(node.mesh);
+      if (used && mesh < drawn.size()) drawn[mesh] = true;
+    }
+    for (std::size_t i = 0; i < drawn.size(); ++i) {
+      for (const tinygltf::Primitive& primitive : gltf_.meshes[i].primitives) {
+        const std::string uv = gltf_uv(gltf_, primitive.material).attribute;
+        for (const auto& [name, accessor] : primitive.attributes) {
+          const bool posed = name == "JOINTS_0" || name == "WEIGHTS_0";
+          const bool known =
+              name == "POSITION" || name == "NORMAL" || name == "COLOR_0" || name == uv;
+          ++(drawn[i] && known   ? account.attributes.used
+             : drawn[i] && posed ? account.attributes.changed
+                                 : account.attributes.left_out);
+        }
+      }
+    }
+  }
+
   Result<void> run() {
     for (const int node : roots()) MODAR_TRY(walk(node, glm::dmat4(1.0), 0));
     finish();
@@ -520,11 +550,13 @@ Result<SourceModel> read_gltf(const std::string& path, const ReadOptions& option
   for (const tinygltf::Image& image : gltf.images) note_file(image.uri);
   use_metallic_roughness(gltf);
   std::vector<MetalMap> metal_maps;
-  model.materials = gltf_materials(gltf, place, path, model.diagnostics, metal_maps);
+  model.materials =
+      gltf_materials(gltf, place, path, model.diagnostics, metal_maps, model.account.images);
   SceneReader scene(gltf, model, path);
   MODAR_TRY(scene.run());
   apply_metal_maps(metal_maps, path, model);
   report_left_out(gltf, scene.left_out(), path, model.diagnostics);
+  scene.account();
   if (model.corner_positions.empty()) {
     return fail(ExitCode::kInvalidInput, "gltf.no-faces", path, "it contains no triangles",
                 "export a mesh in its default scene");

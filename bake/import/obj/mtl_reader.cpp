@@ -358,7 +358,10 @@ struct MtlStatements {
     }
     const glm::vec3 kd = m.diffuse;
     const bool gray = std::max({kd.r, kd.g, kd.b}) - std::min({kd.r, kd.g, kd.b}) <= 0.01f;
-    if ((gray || !has_kd) && !m.diffuse_map.empty()) m.diffuse = glm::vec3(1.0f);
+    if ((gray || !has_kd) && !m.diffuse_map.empty()) {
+      m.whitened = has_kd && kd != glm::vec3(1.0f);
+      m.diffuse = glm::vec3(1.0f);
+    }
     if (m.diffuse_map == emission_map && !emission_map.empty()) m.emission = glm::vec3(0.0f);
     const auto light = [](const glm::vec3& stored) {
       glm::dvec3 linear(0.0);

@@ -391,6 +391,12 @@ class PlyReader {
                       : "mesh the point cloud first, in MeshLab or CloudCompare");
     }
     model_.lost_faces = left_out_;
+    for (const PlyElement& element : header_.elements) {
+      if (element.name != "vertex") continue;
+      model_.account.attributes.left_out = static_cast<std::uint64_t>(
+          std::count_if(element.properties.begin(), element.properties.end(),
+                        [](const PlyProperty& p) { return role_of(p.name) == Role::kNone; }));
+    }
     if (left_out_ != 0) {
       model_.diagnostics.push_back({"ply.left-out", DiagnosticSeverity::kWarning, label_, 0,
                                     std::to_string(left_out_) +

@@ -393,6 +393,30 @@ void keep_used_materials(const SourceModel& source, TriMesh& mesh) {
   for (std::uint32_t& m : mesh.triangle_material) m = to[m];
 }
 
+std::uint64_t count_polygons(const SourceModel& source) {
+  std::uint64_t count = 0;
+  for (std::size_t f = 0; f + 1 < source.first_corner.size(); ++f) {
+    count += source.face_size(f) > 3 ? 1u : 0u;
+  }
+  return count;
+}
+
+/// What the readers counted, with faces, and materials without faces.
+Account account_of(const SourceModel& source, const WeldCounts& counts, std::uint64_t polygons,
+                   const TriMesh& mesh) {
+  Account account = source.account;
+  account.model = mesh.name;
+  Fate& colours = account.colours;
+  const std::uint64_t stated = colours.used + colours.changed;
+  const std::uint64_t unused = stated - std::min<std::uint64_t>(stated, mesh.materials.size());
+  colours.left_out = std::min(unused, colours.used);
+  colours.used -= colours.left_out;
+  const std::uint64_t triangles = mesh.source_face_count - polygons;
+  const std::uint64_t lost = std::min(counts.not_finite + counts.flat, triangles);
+  account.faces = {triangles - lost, polygons, source.lost_faces + lost};
+  return account;
+}
+
 /// Share of a model's triangles whose loss is worth a warning.
 constexpr double kMuchLoss = 0.01;
 
@@ -453,6 +477,7 @@ Result<TriMesh> weld(SourceModel&& source, Report& report, const WeldOptions& op
   mesh.up = source.up;
   mesh.source_vertex_count = source.positions.size();
   mesh.source_face_count = source.face_count();
+  const std::uint64_t polygons = count_polygons(source);
   WeldCounts counts;
   counts.normals = make_normals(source, options.crease);
   if (has_identity_indices(source)) {
@@ -467,6 +492,7 @@ Result<TriMesh> weld(SourceModel&& source, Report& report, const WeldOptions& op
                               source.lost_faces + mesh.source_face_count, report));
   normalise(mesh);
   keep_used_materials(source, mesh);
+  report.accounts.push_back(account_of(source, counts, polygons, mesh));
   report_counts(source.name, counts, mesh.triangles.size(), report);
   timer.done(mesh.source_face_count, mesh.positions.size());
   return mesh;
