@@ -10,6 +10,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "bake/import/source_clips.hpp"
 #include "bake/memory/array.hpp"
 #include "bake/report.hpp"
 #include "bake/up_axis.hpp"
@@ -112,6 +113,10 @@ struct SourceModel {
   std::vector<FaceRun> material_runs;
   std::vector<FaceRun> smoothing_runs;
   std::vector<SourceMaterial> materials;
+  std::vector<SourceJoint> joints;  ///< parents first
+  std::vector<SourceClip> clips;
+  std::vector<FaceRun>
+      joint_runs;  ///< joints that faces move with, or kNoJoint; without clips empty
   std::vector<Diagnostic> diagnostics;
   std::uint64_t lost_faces = 0;  ///< that the file states and the reader could not use
   Account account;               ///< weld() adds faces and unused materials

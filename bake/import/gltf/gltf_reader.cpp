@@ -16,6 +16,7 @@
 
 #include "bake/import/conversion.hpp"
 #include "bake/import/gltf/gltf_accessor.hpp"
+#include "bake/import/gltf/gltf_clips.hpp"
 #include "bake/import/gltf/gltf_materials.hpp"
 #include "bake/import/gltf/gltf_meshopt.hpp"
 #include "bake/import/gltf/gltf_pictures.hpp"
@@ -86,6 +87,10 @@ class SceneReader {
   }
 
   Result<void> run() {
+    GltfClips clips = gltf_clips(gltf_, roots(), label_, model_.diagnostics);
+    node_joints_ = std::move(clips.node_joints);
+    model_.joints = std::move(clips.joints);
+    model_.clips = std::move(clips.clips);
     for (const int node : roots()) MODAR_TRY(walk(node, glm::dmat4(1.0), 0));
     finish();
     return {};
@@ -130,6 +135,7 @@ class SceneReader {
     }
     const glm::dmat4 to_scene = parent * node_transform(node);
     if (node.mesh >= 0 && static_cast<std::size_t>(node.mesh) < gltf_.meshes.size()) {
+      joint_ = node_joints_[static_cast<std::size_t>(index)];
       MODAR_TRY(add_mesh(node, to_scene));
     }
     for (const int child : node.children) MODAR_TRY(walk(child, to_scene, depth + 1));
@@ -235,6 +241,7 @@ class SceneReader {
     }
     const auto places = skins_.bind(primitive, skin, positions.size(), to_scene);
     if (!places) return wrong("gltf.skin", "a skin, its joints or its weights are broken");
+    skinned_ = places->skinned();
     const auto first = static_cast<std::uint32_t>(model_.positions.size());
     std::optional<glm::dmat4> place = places->of(0);
     glm::dmat3 turn(1.0);
@@ -281,16 +288,22 @@ class SceneReader {
     return {accessor.at(v, 0), accessor.at(v, 1), accessor.at(v, 2)};
   }
 
+  static void begin_run(std::vector<FaceRun>& runs, std::uint64_t face, std::uint32_t value) {
+    if (!runs.empty() && runs.back().first_face == face) {
+      runs.back().value = value;
+    } else if (runs.empty() || runs.back().value != value) {
+      runs.push_back({face, value});
+    }
+  }
+
   void begin_material(int material) {
     const bool known = material >= 0 && static_cast<std::size_t>(material) < gltf_.materials.size();
     const auto value = static_cast<std::uint32_t>(known ? static_cast<std::size_t>(material)
                                                         : gltf_.materials.size());
     const std::uint64_t face = model_.corner_positions.size() / 3;
-    if (!model_.material_runs.empty() && model_.material_runs.back().first_face == face) {
-      model_.material_runs.back().value = value;
-    } else if (model_.material_runs.empty() || model_.material_runs.back().value != value) {
-      model_.material_runs.push_back({face, value});
-    }
+    begin_run(model_.material_runs, face, value);
+    // Vertices of skins move with joints of their own: their faces keep the pose of the file.
+    if (!model_.clips.empty()) begin_run(model_.joint_runs, face, skinned_ ? kNoJoint : joint_);
   }
 
   Result<void> add_triangles(const tinygltf::Primitive& primitive, int mode, std::uint32_t first,
@@ -349,6 +362,9 @@ class SceneReader {
   std::string label_;
   SkinPoses skins_;
   std::vector<bool> seen_;  // nodes: glTF's are trees
+  std::vector<std::uint32_t> node_joints_;
+  std::uint32_t joint_ = kNoJoint;  // of the node at hand
+  bool skinned_ = false;            // the primitive at hand
   bool any_colours_ = false;
   std::vector<double> weights_;  // of the mesh at hand's morph targets
   LeftOut left_out_;

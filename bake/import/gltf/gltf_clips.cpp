@@ -1,0 +1,212 @@
+#include "bake/import/gltf/gltf_clips.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include <glm/geometric.hpp>
+
+#include "bake/import/gltf/gltf_accessor.hpp"
+#include "bake/import/gltf/gltf_pose.hpp"
+#include "bake/import/gltf/tinygltf_library.hpp"
+
+namespace modar {
+namespace {
+
+/// Why a channel is left out, for people; empty: it was read.
+using Reason = std::string;
+
+std::optional<TrackPath> path_of(const std::string& word) {
+  if (word == "translation") return TrackPath::kTranslation;
+  if (word == "rotation") return TrackPath::kRotation;
+  if (word == "scale") return TrackPath::kScale;
+  return std::nullopt;
+}
+
+bool read_times(const tinygltf::Model& gltf, int index, std::vector<double>& times) {
+  GltfAccessor accessor;
+  if (!accessor.open(gltf, index) || accessor.components() != 1 || accessor.size() == 0)
+    return false;
+  for (std::size_t i = 0; i < accessor.size(); ++i) {
+    const double time = accessor.at(i, 0);
+    // NaN is in no order.
+    if (!(time >= 0 && time < 1e6) || (i > 0 && !(time > times.back()))) return false;
+    times.push_back(time);
+  }
+  return true;
+}
+
+bool read_values(const tinygltf::Model& gltf, int index, SourceTrack& track) {
+  GltfAccessor accessor;
+  const bool cubic = track.interpolation == Interpolation::kCubic;
+  const bool turns = track.path == TrackPath::kRotation;
+  const std::size_t components = turns ? 4 : 3;
+  const std::size_t count = track.times.size() * (cubic ? 3 : 1);
+  if (!accessor.open(gltf, index) || accessor.components() != components ||
+      accessor.size() < count) {
+    return false;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    glm::dvec4 value(0.0);
+    for (std::size_t c = 0; c < components; ++c) {
+      value[static_cast<int>(c)] = accessor.at(i, c);
+      if (!std::isfinite(accessor.at(i, c))) return false;
+    }
+    const bool tangent = cubic && i % 3 != 1;
+    if (turns && !tangent && !(glm::length(value) > 1e-6)) return false;
+    track.values.push_back(value);
+  }
+  return true;
+}
+
+Reason read_channel(const tinygltf::Model& gltf, const tinygltf::Animation& animation,
+                    const tinygltf::AnimationChannel& channel, SourceTrack& track) {
+  const auto path = path_of(channel.target_path);
+  if (!path)
+    return channel.target_path == "weights" ? "weights of morph targets" : "an unknown target";
+  track.path = *path;
+  const bool known =
+      channel.target_node >= 0 && static_cast<std::size_t>(channel.target_node) < gltf.nodes.size();
+  if (!known) return "a target that does not exist";
+  if (gltf.nodes[static_cast<std::size_t>(channel.target_node)].matrix.size() == 16) {
+    return "a node that has a matrix";
+  }
+  if (channel.sampler < 0 ||
+      static_cast<std::size_t>(channel.sampler) >= animation.samplers.size()) {
+    return "a sampler that does not exist";
+  }
+  const auto& sampler = animation.samplers[static_cast<std::size_t>(channel.sampler)];
+  if (sampler.interpolation == "STEP") track.interpolation = Interpolation::kStep;
+  if (sampler.interpolation == "CUBICSPLINE") track.interpolation = Interpolation::kCubic;
+  if (!read_times(gltf, sampler.input, track.times)) return "times that do not rise";
+  if (!read_values(gltf, sampler.output, track)) return "values that are missing or no numbers";
+  return {};
+}
+
+JointPlace rest_of(const tinygltf::Node& node) {
+  JointPlace place;
+  for (int i = 0; i < 4; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (node.rotation.size() == 4) place.rotation[i] = node.rotation[k];
+    if (i < 3 && node.translation.size() == 3) place.translation[i] = node.translation[k];
+    if (i < 3 && node.scale.size() == 3) place.scale[i] = node.scale[k];
+  }
+  return place;
+}
+
+/// Numbers the moved nodes below `roots`, parents first.
+class JointFinder {
+ public:
+  JointFinder(const tinygltf::Model& gltf, const std::vector<bool>& moved, GltfClips& clips)
+      : gltf_(gltf), moved_(moved), clips_(clips), joint_of_(gltf.nodes.size(), kNoJoint) {
+    clips_.node_joints.assign(gltf.nodes.size(), kNoJoint);
+  }
+
+  /// The reader of the scene refuses nodes that are reached twice, and depths beyond its limit.
+  void walk(const std::vector<int>& roots) {
+    struct Step {
+      int node;
+      std::uint32_t joint;
+      glm::dmat4 before;
+    };
+    std::vector<Step> waiting;
+    std::vector<bool> seen(gltf_.nodes.size(), false);
+    for (const int root : roots) waiting.push_back({root, kNoJoint, glm::dmat4(1.0)});
+    while (!waiting.empty()) {
+      Step step = waiting.back();
+      waiting.pop_back();
+      const auto n = static_cast<std::size_t>(step.node);
+      if (step.node < 0 || n >= seen.size() || seen[n]) continue;
+      seen[n] = true;
+      const tinygltf::Node& node = gltf_.nodes[n];
+      if (moved_[n]) {
+        joint_of_[n] = static_cast<std::uint32_t>(clips_.joints.size());
+        clips_.joints.push_back({step.joint, step.before, rest_of(node)});
+        step = {step.node, joint_of_[n], glm::dmat4(1.0)};
+      } else {
+        step.before = step.before * node_transform(node);
+      }
+      clips_.node_joints[n] = step.joint;
+      for (const int child : node.children) waiting.push_back({child, step.joint, step.before});
+    }
+  }
+
+  [[nodiscard]] std::uint32_t joint(int node) const {
+    return joint_of_[static_cast<std::size_t>(node)];
+  }
+
+ private:
+  const tinygltf::Model& gltf_;
+  const std::vector<bool>& moved_;
+  GltfClips& clips_;
+  std::vector<std::uint32_t> joint_of_;
+};
+
+struct ReadChannel {
+  int node;
+  SourceTrack track;
+};
+
+std::vector<ReadChannel> read_channels(const tinygltf::Model& gltf,
+                                       const tinygltf::Animation& animation, Reason& left_out) {
+  std::vector<ReadChannel> channels;
+  for (const tinygltf::AnimationChannel& channel : animation.channels) {
+    SourceTrack track;
+    const Reason reason = read_channel(gltf, animation, channel, track);
+    if (!reason.empty()) {
+      if (left_out.find(reason) == Reason::npos)
+        left_out += (left_out.empty() ? "" : ", ") + reason;
+      continue;
+    }
+    channels.push_back({channel.target_node, std::move(track)});
+  }
+  return channels;
+}
+
+std::string name_of(const tinygltf::Animation& animation, std::size_t number) {
+  return animation.name.empty() ? "clip " + std::to_string(number + 1) : animation.name;
+}
+
+}  // namespace
+
+GltfClips gltf_clips(const tinygltf::Model& gltf, const std::vector<int>& roots,
+                     const std::string& label, std::vector<Diagnostic>& diagnostics) {
+  GltfClips result;
+  std::vector<std::vector<ReadChannel>> channels;
+  std::vector<bool> moved(gltf.nodes.size(), false);
+  for (std::size_t i = 0; i < gltf.animations.size(); ++i) {
+    Reason left_out;
+    channels.push_back(read_channels(gltf, gltf.animations[i], left_out));
+    for (const ReadChannel& each : channels.back())
+      moved[static_cast<std::size_t>(each.node)] = true;
+    if (left_out.empty()) continue;
+    diagnostics.push_back(
+        {"gltf.clip", DiagnosticSeverity::kWarning, label, 0,
+         "animation '" + name_of(gltf.animations[i], i) + "' is kept without: " + left_out,
+         "check the file with the glTF validator and export it again"});
+  }
+  JointFinder finder(gltf, moved, result);
+  finder.walk(roots);
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    SourceClip clip{name_of(gltf.animations[i], i), 0, {}};
+    for (ReadChannel& each : channels[i]) {
+      each.track.joint = finder.joint(each.node);
+      if (each.track.joint == kNoJoint) continue;  // in no scene, and nothing of it shows
+      clip.duration = std::max(clip.duration, each.track.times.back());
+      clip.tracks.push_back(std::move(each.track));
+    }
+    std::stable_sort(clip.tracks.begin(), clip.tracks.end(), [](const auto& a, const auto& b) {
+      return std::pair(a.joint, a.path) < std::pair(b.joint, b.path);
+    });
+    // Of two channels with one target the first counts.
+    const auto same = [](const auto& a, const auto& b) {
+      return a.joint == b.joint && a.path == b.path;
+    };
+    clip.tracks.erase(std::unique(clip.tracks.begin(), clip.tracks.end(), same), clip.tracks.end());
+    if (!clip.tracks.empty()) result.clips.push_back(std::move(clip));
+  }
+  return result;
+}
+
+}  // namespace modar

@@ -1,0 +1,57 @@
+// The joints of a model file and the clips that move them.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include "formats/clip_tracks.hpp"
+
+namespace modar {
+
+/// Translation, rotation (x, y, z, w) and scale: the joint's place in its parent is their product,
+/// translation first.
+struct JointPlace {
+  glm::dvec3 translation{0.0};
+  glm::dvec4 rotation{0.0, 0.0, 0.0, 1.0};
+  glm::dvec3 scale{1.0};
+
+  [[nodiscard]] glm::dmat4 matrix() const;
+};
+
+inline constexpr std::uint32_t kNoJoint = 0xFFFFFFFFu;
+
+/// A node that a clip moves. parent: of a lower index, or kNoJoint. before: from the parent's space
+/// (the scene's) to that of the joint's place, through the nodes between, which nothing moves.
+struct SourceJoint {
+  std::uint32_t parent = kNoJoint;
+  glm::dmat4 before{1.0};
+  JointPlace rest;
+};
+
+enum class Interpolation : std::uint8_t { kStep, kLinear, kCubic };
+
+/// Times rise, in seconds; the values before the first and behind the last hold. Of kCubic each
+/// time has three values: tangent before, value, tangent behind.
+struct SourceTrack {
+  std::uint32_t joint = 0;
+  TrackPath path = TrackPath::kTranslation;
+  Interpolation interpolation = Interpolation::kLinear;
+  std::vector<double> times;
+  std::vector<glm::dvec4> values;
+
+  /// A rotation has unit length.
+  [[nodiscard]] glm::dvec4 at(double time) const;
+};
+
+struct SourceClip {
+  std::string name;
+  double duration = 0;  ///< seconds: the last time of its tracks
+  std::vector<SourceTrack> tracks;
+};
+
+}  // namespace modar

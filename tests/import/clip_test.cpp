@@ -1,0 +1,161 @@
+// Clips of glTF files against three.js, and the bytes of their tracks.
+#include "bake/mesh/clip/clip_fit.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "bake/import/read_model.hpp"
+
+namespace modar {
+namespace {
+
+const char* source_folder() {
+  const char* folder = std::getenv("MODAR_SOURCE_DIR");
+  return folder != nullptr ? folder : ".";
+}
+
+std::string clip_file(const std::string& name) {
+  return std::string(source_folder()) + "/tests/import/clips/" + name;
+}
+
+/// A triangle that turns (linear), moves (cubic) and grows (step), below a node that nothing moves.
+SourceModel moving_model() {
+  auto model = read_gltf(clip_file("moving.gltf"));
+  EXPECT_TRUE(model) << to_line(model.error());
+  return std::move(*model);
+}
+
+/// The places of the triangle's corners at 20 times, by three.js: tests/import/clips/three.mjs.
+std::vector<glm::dvec3> expected_places() {
+  std::ifstream file(clip_file("moving.txt"));
+  std::vector<glm::dvec3> places;
+  for (glm::dvec3 at; file >> at.x >> at.y >> at.z;) places.push_back(at);
+  return places;
+}
+
+double time_of(const SourceClip& clip, int step) {
+  return clip.duration * (step + 0.37) / 20;
+}
+
+/// The model's positions in the space of the joint that all of them move with.
+JointPoints points_of(const SourceModel& model) {
+  JointPoints result{model.joint_runs.at(0).value, {}};
+  const auto rest = clip_pose(model.joints, {}, 0);
+  const glm::dmat4 back = glm::inverse(rest.at(result.joint));
+  for (const glm::dvec3& p : model.positions) {
+    result.points.push_back(glm::dvec3(back * glm::dvec4(p, 1.0)));
+  }
+  return result;
+}
+
+TEST(Clips, StepLinearAndCubicTracksMoveAsThreeHasThem) {
+  const SourceModel model = moving_model();
+  ASSERT_EQ(model.clips.size(), 1U);
+  const SourceClip& clip = model.clips[0];
+  EXPECT_EQ(clip.name, "all three");
+  EXPECT_EQ(clip.duration, 2.0);
+  const JointPoints points = points_of(model);
+  const auto expected = expected_places();
+  ASSERT_EQ(expected.size(), 60U);
+  for (int step = 0; step < 20; ++step) {
+    const auto pose = clip_pose(model.joints, clip, time_of(clip, step));
+    for (std::size_t v = 0; v < 3; ++v) {
+      const glm::dvec3 at(pose[points.joint] * glm::dvec4(points.points[v], 1.0));
+      const glm::dvec3& wanted = expected[static_cast<std::size_t>(step) * 3 + v];
+      EXPECT_LT(glm::distance(at, wanted), 1e-6) << "step " << step << ", corner " << v;
+    }
+  }
+}
+
+TEST(Clips, PackedTracksStayWithinTheBound) {
+  const SourceModel model = moving_model();
+  const SourceClip& clip = model.clips.at(0);
+  const std::array points = {points_of(model)};
+  std::size_t before = 0;
+  for (const double bound : {1e-1, 1e-2, 1e-3}) {
+    const FittedClip fitted = fit_clip(model.joints, clip, points, bound);
+    EXPECT_LE(fitted.error, bound);
+    EXPECT_GT(fitted.bytes.size(), before) << "a looser bound takes fewer keys";
+    before = fitted.bytes.size();
+    ClipTracksView view;
+    ASSERT_EQ(view_clip_tracks(fitted.bytes, 2, view), nullptr);
+    // Independent of the fit's own measure: where three.js has the corners.
+    const auto expected = expected_places();
+    for (int step = 0; step < 20; ++step) {
+      const double sample = time_of(clip, step) / clip.duration * (view.header->sample_count - 1);
+      const auto pose = tracks_pose(model.joints, view, sample);
+      for (std::size_t v = 0; v < 3; ++v) {
+        const glm::dvec3 at(pose[points[0].joint] * glm::dvec4(points[0].points[v], 1.0));
+        EXPECT_LT(glm::distance(at, expected.at(static_cast<std::size_t>(step) * 3 + v)),
+                  1.2 * bound);
+      }
+    }
+  }
+}
+
+TEST(Clips, WhatMovesNothingGivesNoBytes) {
+  SourceModel model = moving_model();
+  const std::array points = {points_of(model)};
+  EXPECT_TRUE(fit_clip(model.joints, model.clips.at(0), points, 100).bytes.empty());
+  const std::array nowhere = {JointPoints{points[0].joint, {}}};
+  EXPECT_TRUE(fit_clip(model.joints, model.clips.at(0), nowhere, 1e-3).bytes.empty());
+}
+
+TEST(Clips, RotationsKeepTheirDirectionIn48Bits) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> part;
+  for (int i = 0; i < 10000; ++i) {
+    glm::dvec4 q(part(random), part(random), part(random), part(random));
+    q = glm::normalize(q);
+    const auto words = pack_rotation({q.x, q.y, q.z, q.w});
+    EXPECT_EQ(words[2] & 0x8000, 0);
+    const TrackValue back = unpack_rotation(words);
+    const glm::dvec4 packed(back[0], back[1], back[2], back[3]);
+    // Half a step of 4.3e-5 in three parts, and at most as much in the largest.
+    EXPECT_LT(std::min(glm::distance(packed, q), glm::distance(packed, -q)), 8e-5) << i;
+  }
+}
+
+TEST(Clips, DamagedTracksAreRefusedOrAnswer) {
+  const SourceModel model = moving_model();
+  const std::array points = {points_of(model)};
+  const FittedClip fitted = fit_clip(model.joints, model.clips.at(0), points, 1e-2);
+  std::mt19937 random(11);
+  int refused = 0;
+  for (int i = 0; i < 20000; ++i) {
+    std::vector<std::byte> bytes = fitted.bytes;
+    if (i % 5 == 0) bytes.resize(random() % bytes.size());
+    for (unsigned k = 0; k < 1 + random() % 3 && !bytes.empty(); ++k) {
+      bytes[random() % std::min<std::size_t>(bytes.size(), 200)] = static_cast<std::byte>(random());
+    }
+    ClipTracksView view;
+    if (view_clip_tracks(bytes, 2, view) != nullptr) {
+      ++refused;
+      continue;
+    }
+    for (const TrackRecord& track : view.tracks) {
+      std::uint32_t key = static_cast<std::uint32_t>(random());
+      const auto last = static_cast<float>(view.header->sample_count - 1);
+      for (const float part : {0.0f, 0.3f, 1.0f}) {
+        for (const float value : view.at(track, part * last, key))
+          EXPECT_TRUE(std::isfinite(value));
+      }
+    }
+  }
+  EXPECT_GT(refused, 15000);
+}
+
+}  // namespace
+}  // namespace modar

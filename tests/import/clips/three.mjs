@@ -1,0 +1,24 @@
+// Prints where three.js (npm, 0.160) has the vertices of a glTF file at 20 times of its first clip:
+//   node three.mjs moving.gltf > moving.txt
+import fs from 'node:fs';
+import * as THREE from 'three';
+import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
+
+globalThis.self = globalThis;
+globalThis.ProgressEvent ??= class {};
+const gltf = await new GLTFLoader().parseAsync(fs.readFileSync(process.argv[2], 'utf8'), '');
+const mixer = new THREE.AnimationMixer(gltf.scene);
+const clip = gltf.animations[0];
+mixer.clipAction(clip).play();
+for (let step = 0; step < 20; ++step) {
+  mixer.setTime(clip.duration * (step + 0.37) / 20);
+  gltf.scene.updateMatrixWorld(true);
+  gltf.scene.traverse((node) => {
+    if (!node.isMesh) return;
+    const places = node.geometry.attributes.position;
+    for (let i = 0; i < places.count; ++i) {
+      const at = new THREE.Vector3().fromBufferAttribute(places, i).applyMatrix4(node.matrixWorld);
+      console.log(at.x, at.y, at.z);
+    }
+  });
+}
