@@ -46,6 +46,12 @@ std::span<const std::byte> BundleView::texture_data(std::uint32_t texture) const
   return section(SectionType::kTextureData, texture);
 }
 
+ClipTracksView BundleView::clip_tracks(std::uint32_t clip) const {
+  ClipTracksView view;
+  view_clip_tracks(section(SectionType::kClipTracks, clips()[clip].tracks), joints().size(), view);
+  return view;
+}
+
 std::span<const std::byte> BundleView::media_data(std::uint32_t media) const {
   return section(SectionType::kMediaData, media);
 }

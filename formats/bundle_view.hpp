@@ -7,6 +7,8 @@
 #include <string_view>
 
 #include "formats/base/error.hpp"
+#include "formats/clip_tracks.hpp"
+#include "formats/clips.hpp"
 #include "formats/layout.hpp"
 #include "formats/scene_nodes.hpp"
 
@@ -109,6 +111,11 @@ struct BundleParts {
   Table<NodeRecord> nodes;
   Table<ActionRecord> actions;
   Table<MediaRecord> media;
+  Table<ClipRecord> clips;
+  Table<JointRecord> joints;
+  Table<BoneRecord> bones;
+  Table<PartRecord> parts;
+  Table<SceneClipRecord> scene_clips;
 
   /// Groups in the order of their chunks, which follow each other: all models, then all proxies.
   [[nodiscard]] std::uint32_t chunk_groups() const { return models.size() + proxies.size(); }
@@ -168,6 +175,14 @@ class BundleView {
   [[nodiscard]] Table<NodeRecord> nodes() const { return parts_.nodes; }
   [[nodiscard]] Table<ActionRecord> actions() const { return parts_.actions; }
   [[nodiscard]] Table<MediaRecord> media() const { return parts_.media; }
+  [[nodiscard]] Table<ClipRecord> clips() const { return parts_.clips; }
+  [[nodiscard]] Table<JointRecord> joints() const { return parts_.joints; }
+  [[nodiscard]] Table<BoneRecord> bones() const { return parts_.bones; }
+  [[nodiscard]] Table<PartRecord> moving_parts() const { return parts_.parts; }
+  [[nodiscard]] Table<SceneClipRecord> scene_clips() const { return parts_.scene_clips; }
+  /// Those of its own or of the clip that it names; validated: tracks name joints of its model, by
+  /// their index in it.
+  [[nodiscard]] ClipTracksView clip_tracks(std::uint32_t clip) const;
   /// The file of a media record.
   [[nodiscard]] std::span<const std::byte> media_data(std::uint32_t media) const;
 

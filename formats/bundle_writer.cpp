@@ -209,6 +209,11 @@ void collect(const BundleContent& content, SectionList& list) {
   list.add_table(SectionType::kNodes, content.nodes);
   list.add_table(SectionType::kActions, content.actions);
   list.add_table(SectionType::kMedia, content.media);
+  list.add_table(SectionType::kClips, content.clips);
+  list.add_table(SectionType::kJoints, content.joints);
+  list.add_table(SectionType::kBones, content.bones);
+  list.add_table(SectionType::kParts, content.parts);
+  list.add_table(SectionType::kSceneClips, content.scene_clips);
   list.add_proxies(content);
   for (std::uint32_t pattern = 0; pattern < content.features.size(); ++pattern) {
     for (const FeatureContent& features : content.features[pattern]) {
@@ -220,6 +225,9 @@ void collect(const BundleContent& content, SectionList& list) {
   }
   for (std::uint32_t media = 0; media < content.media_data.size(); ++media) {
     list.add_blob(SectionType::kMediaData, media, content.media_data[media]);
+  }
+  for (std::uint32_t clip = 0; clip < content.clip_tracks.size(); ++clip) {
+    list.add_blob(SectionType::kClipTracks, clip, content.clip_tracks[clip]);
   }
   list.add_blob(SectionType::kVertices, kNone, content.vertices);
   list.add_blob(SectionType::kIndices, kNone, content.indices);
@@ -292,6 +300,7 @@ std::uint16_t minor_version_of(const BundleContent& content) {
   if (!content.actions.empty()) need_section(SectionType::kActions);
   if (!content.media.empty()) need_section(SectionType::kMedia);
   if (!content.proxies.empty()) need_section(SectionType::kProxies);
+  if (!content.parts.empty()) need_section(SectionType::kParts);
   return minor;
 }
 

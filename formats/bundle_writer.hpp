@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "formats/base/error.hpp"
+#include "formats/clips.hpp"
 #include "formats/layout.hpp"
 #include "formats/scene_nodes.hpp"
 
@@ -56,6 +57,12 @@ struct BundleContent {
   std::vector<NodeRecord> nodes;
   std::vector<ActionRecord> actions;
   std::vector<MediaRecord> media;
+  std::vector<ClipRecord> clips;
+  std::vector<JointRecord> joints;
+  std::vector<BoneRecord> bones;
+  std::vector<PartRecord> parts;
+  std::vector<SceneClipRecord> scene_clips;
+  std::vector<std::vector<std::byte>> clip_tracks;  ///< by clip; empty: another clip owns its own
   /// Their first_chunk counts in proxy_chunks, first_level of these in proxy_levels: the
   /// writer adds the number of chunks and levels of models, which is known last.
   std::vector<ProxyRecord> proxies;

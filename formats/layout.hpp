@@ -14,7 +14,7 @@ namespace modar {
 
 inline constexpr std::array<std::uint8_t, 8> kMagic = {0x89, 'M', 'O', 'D', 0x0D, 0x0A, 0x1A, 0x0A};
 inline constexpr std::uint16_t kMajorVersion = 1;    ///< must match
-inline constexpr std::uint16_t kMinorVersion = 3;    ///< additive
+inline constexpr std::uint16_t kMinorVersion = 4;    ///< additive
 inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;  ///< "no such index"
 inline constexpr std::uint64_t kNoOffset = 0xFFFFFFFFFFFFFFFFull;
 inline constexpr std::uint32_t kMaxSections = 65536;
@@ -173,6 +173,8 @@ enum class Semantic : std::uint8_t {
   kUv = 3,         ///< 2 components
   kColour = 4,     ///< RGBA
   kNormalOct = 5,  ///< 2 components, octahedral
+  kJoints = 6,     ///< 4 u8: bones of the part, PartRecord
+  kWeights = 7,    ///< 4 normalised u8 whose sum is 255
 };
 enum class ComponentType : std::uint8_t {
   kHalf = 1,

@@ -14,7 +14,7 @@
 namespace modar {
 
 /// What the index in a section's `owner` counts; kNothing: it has none, and its variant is 0.
-enum class SectionOwner : std::uint8_t { kNothing, kPattern, kScene, kChunk, kTexture, kMedia };
+enum class SectionOwner : std::uint8_t { kNothing, kPattern, kScene, kChunk, kTexture, kMedia, kClip };
 
 enum SectionFlags : std::uint16_t {
   kSectionRequired = 1,  ///< a reader that does not know the type must refuse the bundle
@@ -34,6 +34,11 @@ enum SectionFlags : std::uint16_t {
   X(kLevels, 18, "levels", "LevelRecord", 0, kSectionRequired, kNothing)                       \
   X(kMaterials, 19, "materials", "MaterialRecord", 0, kSectionRequired, kNothing)              \
   X(kLayouts, 20, "layouts", "LayoutRecord", 0, kSectionRequired, kNothing)                    \
+  X(kClips, 21, "clips", "ClipRecord", 4, 0, kNothing)                                         \
+  X(kJoints, 22, "joints", "JointRecord", 4, 0, kNothing)                                      \
+  X(kBones, 23, "bones", "BoneRecord", 4, 0, kNothing)                                         \
+  X(kParts, 24, "parts", "PartRecord", 4, 0, kNothing)                                         \
+  X(kSceneClips, 25, "scene_clips", "SceneClipRecord", 4, 0, kNothing)                         \
   X(kTextures, 32, "textures", "TextureRecord", 0, kSectionRequired, kNothing)                 \
   X(kTextureLevels, 33, "texture_levels", "TextureLevelRecord", 0, kSectionRequired, kNothing) \
   X(kPatterns, 48, "patterns", "PatternRecord", 0, kSectionRequired, kNothing)                 \
@@ -56,6 +61,7 @@ enum SectionFlags : std::uint16_t {
   X(kDrawOrder, 262, "draw_order", "DrawOrderRecord", 2, 0, kChunk)                            \
   X(kMediaData, 263, "media_data", "", 3, 0, kMedia)                                           \
   X(kPatternPicture, 264, "pattern_picture", "", 3, 0, kPattern)                               \
+  X(kClipTracks, 265, "clip_tracks", "ClipTracksHeader", 4, 0, kClip)                          \
   X(kVertices, 512, "vertices", "", 0, kSectionRequired | kSectionGpu, kNothing)               \
   X(kIndices, 513, "indices", "", 0, kSectionRequired | kSectionGpu, kNothing)                 \
   X(kTextureData, 514, "texture_data", "", 0, kSectionRequired | kSectionGpu, kTexture)
@@ -147,6 +153,10 @@ enum MediaFlags : std::uint32_t {
   kMediaFlashes = 2,  ///< a quarter of it flashes more than three times in a second (WCAG 2.3.1)
 };
 
+enum SceneClipFlags : std::uint32_t {
+  kSceneClipLoops = 1,  ///< begins again where it ends; else its last pose stays
+};
+
 /// A bit of the `flags` of a record.
 struct FlagInfo {
   const char* record;
@@ -173,6 +183,7 @@ inline constexpr FlagInfo kFlags[] = {
     {"NodeRecord", kNodeLoops, 0},
     {"MediaRecord", kMediaSound, 0},
     {"MediaRecord", kMediaFlashes, 0},
+    {"SceneClipRecord", kSceneClipLoops, 4},
 };
 
 /// All flags that a record can have.

@@ -268,6 +268,11 @@ bool validate_tables(FaultLog& log, BundleParts& parts) {
   walkable &= find_table(log, parts, SectionType::kActions, parts.actions);
   walkable &= find_table(log, parts, SectionType::kMedia, parts.media);
   walkable &= find_table(log, parts, SectionType::kProxies, parts.proxies);
+  walkable &= find_table(log, parts, SectionType::kClips, parts.clips);
+  walkable &= find_table(log, parts, SectionType::kJoints, parts.joints);
+  walkable &= find_table(log, parts, SectionType::kBones, parts.bones);
+  walkable &= find_table(log, parts, SectionType::kParts, parts.parts);
+  walkable &= find_table(log, parts, SectionType::kSceneClips, parts.scene_clips);
   Table<ChunkRecord> chunks;
   walkable &= find_table(log, parts, SectionType::kProxyChunks, chunks);
   parts.chunks.append(chunks);
@@ -346,6 +351,8 @@ bool components_fit(std::uint8_t semantic, std::uint8_t components) {
     case Semantic::kNormalOct:
       return components == 2;
     case Semantic::kColour:
+    case Semantic::kJoints:
+    case Semantic::kWeights:
       return components == 4;
   }
   return false;
@@ -353,7 +360,7 @@ bool components_fit(std::uint8_t semantic, std::uint8_t components) {
 
 bool known_semantic(std::uint8_t semantic) {
   return semantic >= static_cast<std::uint8_t>(Semantic::kPosition) &&
-         semantic <= static_cast<std::uint8_t>(Semantic::kNormalOct);
+         semantic <= static_cast<std::uint8_t>(Semantic::kWeights);
 }
 
 bool is_float(std::uint8_t type) {
@@ -896,6 +903,8 @@ Owners owners_of(const BundleParts& parts, SectionOwner owner) {
       return {"chunk", parts.chunks.own().size()};
     case SectionOwner::kTexture:
       return {"texture", parts.textures.size()};
+    case SectionOwner::kClip:
+      return {"clip", parts.clips.size()};
     case SectionOwner::kMedia:
       return {"media", parts.media.size()};
   }
