@@ -212,6 +212,35 @@ class GeometryCheck {
     }
   }
 
+  /// The bones that vertices name: of those without a part the first alone.
+  template <class Where>
+  void check_bones(const LayoutRecord& layout, const ChunkRecord& chunk, const LevelRecord& level,
+                   Where where) {
+    const AttributeRecord* joints = find_attribute(layout, Semantic::kJoints);
+    const AttributeRecord* weights = find_attribute(layout, Semantic::kWeights);
+    if (joints == nullptr || weights == nullptr) return;
+    std::uint32_t bones = 1;
+    for (const PartRecord& part : parts_.parts) {
+      if (part.material == chunk.material) bones = part.bone_count;
+    }
+    Tally wrong;
+    const auto* indices =
+        reinterpret_cast<const std::uint16_t*>(parts_.indices.data() + level.index_offset);
+    for (std::uint32_t i = 0; i < level.index_count; ++i) {
+      if (indices[i] >= level.vertex_count) continue;  // told by check_level()
+      const std::byte* vertex = parts_.vertices.data() + level.vertex_offset +
+                                std::size_t{indices[i]} * layout.stride;
+      std::uint32_t sum = 0;
+      bool good = true;
+      for (std::size_t k = 0; k < 4; ++k) {
+        sum += std::to_integer<std::uint32_t>(vertex[weights->offset + k]);
+        good = good && std::to_integer<std::uint32_t>(vertex[joints->offset + k]) < bones;
+      }
+      if (!good || sum != 255) wrong.hit(offset_of(parts_, vertex + joints->offset));
+    }
+    tell(Rule::kVertexBones, wrong, where, "corners name wrong bones or weights");
+  }
+
   /// After all levels of a chunk: its box is no larger than what they hold.
   template <class Where>
   void finish_chunk(const ChunkRecord& chunk, Where where) {
@@ -390,6 +419,8 @@ void check_geometry(FaultLog& log, const BundleParts& parts, BufferHashes& hashe
       const auto where = [&] { return group_label(parts, i) + ", chunk " + std::to_string(j); };
       for (std::uint32_t k = 0; k < chunk.level_count; ++k) {
         const LevelRecord& level = parts.levels[chunk.first_level + k];
+        check.check_bones(layout, chunk, level,
+                          [&] { return where() + ", level " + std::to_string(k); });
         check.check_level(layout, scan, chunk, level,
                           [&] { return where() + ", level " + std::to_string(k); });
         // Hashed while the caches still hold it.

@@ -13,7 +13,10 @@ namespace modar {
 inline constexpr std::uint32_t kClipRate = 120;  ///< samples in a second
 inline constexpr std::uint32_t kMaxClipSamples =
     65536;  ///< nine minutes; keys count them in 16 bits
-inline constexpr std::uint32_t kMaxClipTracks = 3 * 4096;
+/// Vertex uniforms hold three vec4 a bone; 32 of ES 2.0's 128 remain for the rest of the program.
+inline constexpr std::uint32_t kMostPartBones = 32;
+inline constexpr std::uint32_t kMaxJoints = 4096;  ///< of a bundle
+inline constexpr std::uint32_t kMaxClipTracks = 3 * kMaxJoints;
 
 enum class TrackPath : std::uint8_t { kTranslation = 1, kRotation = 2, kScale = 3 };
 

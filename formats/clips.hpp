@@ -4,14 +4,13 @@
 
 #include <cstdint>
 
+#include "formats/clip_tracks.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {
 
-/// Vertex uniforms hold three vec4 a bone; 32 of ES 2.0's 128 remain for the rest of the program.
-inline constexpr std::uint32_t kMostPartBones = 32;
-inline constexpr std::uint32_t kMaxJoints = 4096;  ///< of a bundle; kMaxClipTracks follows from it
 inline constexpr std::uint32_t kMostClips = 256;   ///< of a bundle
+inline constexpr float kLeastClipSeconds = 1.0f / 1024;
 inline constexpr float kMostClipSeconds = 546.0f;  ///< kMaxClipSamples at kClipRate
 
 /// A movement of a model's joints. Time 0 to seconds.

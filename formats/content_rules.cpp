@@ -69,6 +69,8 @@ constexpr auto kContentKinds = std::to_array<IssueKind>({
      kContentRebake},
     {"VERTEX_PADDING", Severity::kError, "Padding bytes of a vertex are not zero", kContentRebake},
     {"VERTEX_OCCLUSION", Severity::kError, "A vertex's occlusion is above 127", kContentRebake},
+    {"VERTEX_BONES", Severity::kError,
+     "A vertex names bones that its part lacks, or its weights do not sum to 255", kContentRebake},
     {"PATTERN_YML_DIFFERS", Severity::kError,
      "A feature text, read by OpenCV, differs from its mapped twin", kContentRebake},
     {"VERTICES_UNREFERENCED", Severity::kWarning, "Bytes of the vertex buffer belong to no level",

@@ -157,7 +157,7 @@ void summarise(const BundleParts& parts, std::uint16_t minor,
   append(first, std::uint32_t{minor});
   sink(first + "}", "header", 0);
   summarise_table(parts, "ModelRecord", parts.models, sink);
-  // Readers that skip proxies expect no lines of them: their sections' hashes represent them.
+  // Readers that skip clips and proxies expect no lines of them: their sections' hashes are there.
   summarise_table(parts, "ChunkRecord", parts.chunks.own(), sink);
   summarise_table(parts, "LevelRecord", parts.levels.own(), sink);
   summarise_table(parts, "MaterialRecord", parts.materials, sink);

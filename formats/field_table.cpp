@@ -1,5 +1,7 @@
 // Names, places and types of all fields, taken from the structs by the compiler.
 #include "formats/field_table.hpp"
+#include "formats/clip_tracks.hpp"
+#include "formats/clips.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/draw_order.hpp"
 #include "formats/pattern_shape.hpp"
@@ -84,6 +86,13 @@ MODAR_FIELDS(MediaRecord, name, kind, flags, width, height, seconds, poster, res
 MODAR_FIELDS(ActionRecord, event, command, source, target, part, address, seconds, duration, axis,
              degrees, reserved);
 MODAR_FIELDS(ProxyRecord, model, first_chunk, chunk_count, reserved);
+MODAR_FIELDS(ClipRecord, name, model, tracks, seconds, error, reserved);
+MODAR_FIELDS(JointRecord, model, parent, before, translation, rotation, scale);
+MODAR_FIELDS(BoneRecord, joint, reserved, inverse);
+MODAR_FIELDS(PartRecord, material, first_bone, bone_count, reserved, bounds_min, bounds_max);
+MODAR_FIELDS(SceneClipRecord, scene, clip, flags, reserved);
+MODAR_FIELDS(ClipTracksHeader, track_count, sample_count, reserved);
+MODAR_FIELDS(TrackRecord, joint, path, reserved0, key_count, keys, low, step, reserved1);
 MODAR_FIELDS(ColourGridHeader, columns, rows, reserved);
 MODAR_FIELDS(PatternShapeHeader, kind, face_count, half_arc, slope, reserved);
 MODAR_FIELDS(ShapeFaceRecord, place, corner, right, down, reserved);
@@ -121,7 +130,10 @@ constexpr RecordInfo kRecords[] = {
     table_of(MODAR_TYPE(LightRecord)),        table_of(MODAR_TYPE(OcclusionRecord)),
     table_of(MODAR_TYPE(NodeRecord)),         table_of(MODAR_TYPE(ActionRecord)),
     table_of(MODAR_TYPE(MediaRecord)),        table_of(MODAR_TYPE(ProxyRecord)),
-    record_of(MODAR_TYPE(FileHeader)),        record_of(MODAR_TYPE(SectionEntry)),
+    table_of(MODAR_TYPE(ClipRecord)),         table_of(MODAR_TYPE(JointRecord)),
+    table_of(MODAR_TYPE(BoneRecord)),         table_of(MODAR_TYPE(PartRecord)),
+    table_of(MODAR_TYPE(SceneClipRecord)),    record_of(MODAR_TYPE(ClipTracksHeader)),
+    record_of(MODAR_TYPE(TrackRecord)),       record_of(MODAR_TYPE(FileHeader)),        record_of(MODAR_TYPE(SectionEntry)),
     record_of(MODAR_TYPE(TableHeader)),       record_of(MODAR_TYPE(AttributeRecord)),
     record_of(MODAR_TYPE(FeatureHeader)),     record_of(MODAR_TYPE(KeypointRecord)),
     record_of(MODAR_TYPE(ColourGridHeader)),  record_of(MODAR_TYPE(PatternShapeHeader)),

@@ -54,6 +54,8 @@ constexpr auto kOpeningKinds = std::to_array<IssueKind>({
     {"BUNDLE_PROXY", Severity::kError,
      "A proxy has no model, chunks of another, or not one level of one error in each chunk",
      kRebake},
+    {"BUNDLE_CLIP", Severity::kError,
+     "A clip, joint, bone or part refers to what does not exist, or tracks are damaged", kRebake},
     {"BUNDLE_LEVEL_RANGE", Severity::kError,
      "A level of detail refers to vertices or indices that do not exist", kRebake},
     {"BUNDLE_MATERIAL_RANGE", Severity::kError,

@@ -36,6 +36,7 @@ enum class Rule : std::uint8_t {
   kModelRange,
   kChunkRange,
   kProxy,
+  kClip,
   kLevelRange,
   kMaterialRange,
   kLayout,
@@ -80,6 +81,7 @@ enum class Rule : std::uint8_t {
   kCaptions,
   kVertexPadding,
   kVertexOcclusion,
+  kVertexBones,
   kYmlDiffers,  ///< found by `modar check` on a workstation: it needs OpenCV
   kUnreferencedVertices,
   kUnreferencedIndices,

@@ -34,7 +34,8 @@ bool has_member(SectionType type) {
       kMaterials,  kLayouts, kTextures,       kTextureLevels, kPatterns,    kParameterSets,
       kScenes,     kLights,  kOcclusion,      kNodes,         kActions,     kMappedFeatures,
       kFeatureYml, kShadow,  kVertices,       kIndices,       kTextureData, kMedia,
-      kMediaData,  kProxies, kProxyChunks,    kProxyLevels};
+      kMediaData,  kProxies, kProxyChunks,    kProxyLevels,   kClips,       kJoints,
+      kBones,      kParts,   kSceneClips,     kClipTracks};
   return std::find(std::begin(kMembers), std::end(kMembers), type) != std::end(kMembers);
 }
 
@@ -98,7 +99,7 @@ ExtraSection extra_of(const BundleView& bundle, const SectionEntry& entry) {
           entry.owner, entry.variant, bytes_of(bundle.section(type, entry.owner, entry.variant))};
 }
 
-/// Tables that are about neither proxies nor features.
+/// Tables, and tracks of clips, that are about neither proxies nor features.
 BundleContent tables_of(const BundleView& bundle) {
   BundleContent content;
   const auto names = bundle.section(SectionType::kNames);
@@ -118,6 +119,14 @@ BundleContent tables_of(const BundleView& bundle) {
   content.nodes = records_of(bundle.nodes());
   content.actions = records_of(bundle.actions());
   content.media = records_of(bundle.media());
+  content.clips = records_of(bundle.clips());
+  content.joints = records_of(bundle.joints());
+  content.bones = records_of(bundle.bones());
+  content.parts = records_of(bundle.moving_parts());
+  content.scene_clips = records_of(bundle.scene_clips());
+  for (std::uint32_t c = 0; c < bundle.clips().size(); ++c) {
+    content.clip_tracks.push_back(bytes_of(bundle.section(SectionType::kClipTracks, c)));
+  }
   return content;
 }
 

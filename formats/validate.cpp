@@ -1051,6 +1051,7 @@ void validate_assets(FaultLog& log, const BundleParts& parts) {
   for (std::uint32_t i = 0; i < parts.occlusion.size() && !log.stop(); ++i) {
     check_occlusion(RecordCheck(log, parts, "occlusion", i), parts, i);
   }
+  if (!log.stop()) validate_clips(log, parts);
   if (!log.stop()) validate_nodes(log, parts);
 }
 

@@ -28,6 +28,9 @@ void validate_models(FaultLog& log, const BundleParts& parts);
 /// Textures, patterns, parameter sets, features, scenes.
 void validate_assets(FaultLog& log, const BundleParts& parts);
 
+/// Clips, joints, bones, parts, and what scenes play (validate_clips.cpp).
+void validate_clips(FaultLog& log, const BundleParts& parts);
+
 /// Nodes and actions (validate_nodes.cpp).
 void validate_nodes(FaultLog& log, const BundleParts& parts);
 

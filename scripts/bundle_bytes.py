@@ -106,6 +106,11 @@ TABLES = {
     19: ("materials", Record("name:N ambient:3f diffuse:3f specular:3f emission:3f shininess:f "
                              "opacity:f texture:I flags:I reserved:2I")),
     20: ("layouts", Record("stride:H attribute_count:H reserved:I attributes:64B")),
+    21: ("clips", Record("name:N model:I tracks:I seconds:f error:f reserved:2I")),
+    22: ("joints", Record("model:I parent:I before:12f translation:3f rotation:4f scale:3f")),
+    23: ("bones", Record("joint:I reserved:3I inverse:12f")),
+    24: ("parts", Record("material:I first_bone:I bone_count:I reserved:I bounds_min:3f bounds_max:3f")),
+    25: ("scene_clips", Record("scene:I clip:I flags:I reserved:I")),
     32: ("textures", Record("name:N width:I height:I source_width:I source_height:I format:I "
                             "flags:I first_level:I level_count:I psnr_db:f ssim:f reserved:4I")),
     33: ("texture_levels", Record("offset:Q alpha_offset:Q size:I width:I height:I psnr_db:f ssim:f "
@@ -133,11 +138,14 @@ COLOURS = Record("columns:I rows:I reserved:2I")
 SHAPE = Record("kind:I face_count:I half_arc:d slope:d reserved:2I")
 FACE = Record("place:4H corner:3f right:3f down:3f reserved:I")
 SHADOW = Record("width:I height:I low:2f high:2f reserved:2I")
+TRACKS = Record("track_count:I sample_count:I reserved:2I")
+TRACK = Record("joint:I path:B reserved0:B key_count:H keys:I low:3f step:3f reserved1:I")
 DRAW_ORDER = struct.Struct("<4f2I")
 KEYPOINT = struct.Struct("<5f2i")
-SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}, **{kind: 0 for kind in range(65, 73)}}  # type: flags
-OWNED = {256: 1, 257: 0, 258: 0, 259: 0, 260: 0, 261: 0, 262: 0, 263: 0, 264: 0, 514: 3}
-SINCE = {4: 1, 65: 2, 66: 2, 67: 3, 68: 3, 69: 3, 70: 3, 71: 3, 72: 3, 263: 3, 264: 3, 259: 2, 260: 2, 261: 2, 262: 2}  # type: minor version
+SINGLES = {1: 1, 2: 0, 3: 0, 4: 0, 512: 3, 513: 3, **{kind: 1 for kind in TABLES}, **{kind: 0 for kind in (*range(21, 26), *range(65, 73))}}  # type: flags
+OWNED = {256: 1, 257: 0, 258: 0, 259: 0, 260: 0, 261: 0, 262: 0, 263: 0, 264: 0, 265: 0, 514: 3}
+SINCE = {4: 1, 65: 2, 66: 2, 67: 3, 68: 3, 69: 3, 70: 3, 71: 3, 72: 3, 263: 3, 264: 3, 259: 2, 260: 2, 261: 2, 262: 2,
+         **{kind: 4 for kind in (*range(21, 26), 265)}}  # type: minor version
 COMPONENTS = {1: "e", 2: "h", 3: "H", 4: "b", 5: "B", 6: "f"}
 
 
@@ -168,7 +176,7 @@ class Bundle:
         end = 64 + 48 * head["section_count"]
         need(head["section_count"] <= 65536 and end <= len(data), "BUNDLE_SECTION_COUNT", 12)
         need(xxh64(data[:56] + data[64:end]) == head["hash"], "BUNDLE_HEADER_HASH", 56)
-        self.strict = head["minor"] <= 3
+        self.strict = head["minor"] <= 4
         self.clean(head)
 
     def clean(self, record):

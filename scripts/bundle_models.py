@@ -3,9 +3,10 @@ import math
 import struct
 
 from bundle_bytes import ATTRIBUTE, COMPONENTS, NONE, at_least, digest, flags_known, follow, need
+from bundle_clips import check_bones
 
-SEMANTICS = {1: "positions", 2: "normals", 3: "uvs", 4: "colours", 5: "normals"}
-WIDTHS = {1: (3, 4), 2: (3,), 3: (2,), 4: (4,), 5: (2,)}
+SEMANTICS = {1: "positions", 2: "normals", 3: "uvs", 4: "colours", 5: "normals", 6: "joints", 7: "weights"}
+WIDTHS = {1: (3, 4), 2: (3,), 3: (2,), 4: (4,), 5: (2,), 6: (4,), 7: (4,)}
 LENGTH_STEP = {1: 0.02, 2: 2e-3, 4: 1e-4}  # by bytes of a component
 
 
@@ -229,7 +230,7 @@ def octahedral(x, y):
 
 
 def decode_level(bundle, layout, chunk, level, full):
-    at, out = level["at"], {}
+    at, out, bones = level["at"], {}, {}
     indices = struct.unpack_from(f"<{level['index_count']}H", bundle.indices, level["index_offset"])
     need(max(indices, default=-1) < level["vertex_count"], "LEVEL_INDEX", at)
     used = sorted(set(indices))
@@ -246,6 +247,8 @@ def decode_level(bundle, layout, chunk, level, full):
                      for v, (low, high) in zip(values[i], box)), "CHUNK_BOUNDS", at)
             out["used"] = [values[i] for i in used]
             out["triangles"] = [tuple(values[i] for i in indices[t:t + 3]) for t in range(0, len(indices), 3)]
+        if part["semantic"] in (6, 7):
+            bones[part["semantic"]] = [raw[i] for i in used]
         if part["semantic"] == 2:
             step = LENGTH_STEP[struct.calcsize(COMPONENTS[part["type"]])]
             need(all(abs(math.sqrt(sum(v * v for v in values[i])) - 1) <= step for i in used),
@@ -254,6 +257,8 @@ def decode_level(bundle, layout, chunk, level, full):
         out[SEMANTICS[part["semantic"]]] = digest(struct.pack(f"<{len(flat)}d", *flat))
         if full:
             out[SEMANTICS[part["semantic"]] + "_values"] = values
+    if len(bones) == 2:
+        check_bones(bundle, chunk, bones[6], bones[7])
     owned = {row["offset"] for row in bundle.tables["occlusion"]
              if bundle.tables["layouts"][row["layout"]] is layout}
     for byte in owned:

@@ -47,7 +47,7 @@ def section_lines(bundle):
 def lines_of(bundle):
     yield [("summary", 1, "I"), ("minor", bundle.header["minor"], "H")]
     for kind, (table, record) in TABLES.items():
-        if kind in (67, 71, 72):  # proxies: their sections' lines alone
+        if kind in (*range(21, 26), 67, 71, 72):  # clips and proxies: their sections' lines alone
             continue
         for index, row in enumerate(bundle.tables[table]):
             yield list(record_pairs(table, record, index, row))

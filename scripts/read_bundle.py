@@ -15,6 +15,7 @@ import sys
 
 from bundle_bytes import (COLOURS, DRAW_ORDER, FACE, FEATURES, KEYPOINT, NO_OFFSET, NONE, SHADOW, SHAPE, Bundle, Fault, at_least,
                           digest, flags_known, follow, need)
+from bundle_clips import check_clips
 from bundle_models import check_models, check_tight, decode_level, proxy_chunks
 from bundle_nodes import check_nodes
 from bundle_summary import check_summary
@@ -286,6 +287,7 @@ def check(bundle, full):
     check_models(bundle)
     check_textures(bundle)
     check_patterns(bundle)
+    check_clips(bundle)
     check_nodes(bundle)
     features = read_features(bundle)
     check_summary(bundle)
@@ -313,7 +315,7 @@ def check(bundle, full):
 def scene_digest(bundle, decoded):
     """Of everything that is drawn or recognised: not of its place in the file or how it was made."""
     scene = {key: value for key, value in decoded.items() if key not in ("bytes", "meta", "sections")}
-    looks = {f"{kind} {owner}": digest(data) for (kind, owner, _), data in bundle.payload.items() if 258 <= kind <= 264}
+    looks = {f"{kind} {owner}": digest(data) for (kind, owner, _), data in bundle.payload.items() if 258 <= kind <= 265}
     scene.update(looks=looks, shades=bundle.shades)
     return digest(json.dumps(scene, sort_keys=True).encode())
 

@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include "bake/bundle/bundle_json.hpp"
+#include "bake/bundle/clip_records.hpp"
 #include "bake/bundle/light_image.hpp"
 #include "bake/bundle/request_check.hpp"
 #include "bake/bundle/scene/scene_nodes.hpp"
@@ -106,7 +107,7 @@ void append_geometry(PackedMesh packed, std::uint32_t first_material,
 
 /// Appends a model's records and bytes.
 void merge_model(PackedMesh packed, const std::vector<TextureOutcome>& textures,
-                 BundleContent& content) {
+                 const ModelMovement& movement, BundleContent& content) {
   ModelRecord record = packed.record;
   record.name = content.intern(packed.name);
   record.layout = layout_index(packed.layout, content);
@@ -122,9 +123,14 @@ void merge_model(PackedMesh packed, const std::vector<TextureOutcome>& textures,
     if (textures[m].constant) fold_constant(textures[m].rgba, material);
     content.materials.push_back(material);
   }
+  std::vector<std::uint32_t> parts;
+  for (const SourceMaterial& source : packed.sources) parts.push_back(source.part);
+  const Placement placement = {{record.center[0], record.center[1], record.center[2]},
+                               record.scale};
   append_geometry(std::move(packed), record.first_material, content.chunks, content.levels,
                   content);
   content.models.push_back(record);
+  add_movement(movement, parts, placement, content);
 }
 
 /// Appends a proxy of the last model.
@@ -136,7 +142,11 @@ void merge_proxy(PackedMesh packed, BundleContent& content) {
                   content.proxy_levels, content);
 }
 
-/// The order of the last model's triangles that are seen through.
+bool moves(const BundleContent& content, std::uint32_t material) {
+  return ranges::find(content.parts, material, &PartRecord::material) != content.parts.end();
+}
+
+/// The order of the last model's triangles that are seen through, where it is the same at any time.
 void add_draw_orders(BundleContent& content) {
   const ModelRecord& model = content.models.back();
   const VertexDecoder decoder(content.layouts[model.layout]);
@@ -145,6 +155,7 @@ void add_draw_orders(BundleContent& content) {
     const LevelRecord& level = content.levels[chunk.first_level];
     const std::size_t count = level.index_count / 3;
     if (!blended(content.materials[chunk.material], content)) continue;
+    if (moves(content, chunk.material)) continue;
     if (count < 2 || count > kMostOrderedTriangles) continue;
     std::vector<std::array<glm::dvec3, 3>> triangles(count);
     for (std::size_t i = 0; i < 3 * count; ++i) {
@@ -167,6 +178,7 @@ void add_draw_orders(BundleContent& content) {
 /// A model that is welded and waits for its textures, which other models may share.
 struct WeldedModel {
   TriMesh mesh;
+  ModelMovement movement;
   std::vector<std::uint32_t> uses;  ///< of textures, one a material
 };
 
@@ -191,13 +203,58 @@ bool own_picture(const ModelRequest& model, const BakeRequest& request) {
                       });
 }
 
+/// Of the box's largest side: what half floats may move a vertex by, too.
+constexpr double kClipBound = 0x1p-12;
+
+/// The greatest distance that a model's clips may be off, source units.
+double clip_bound(const SourceModel& source, const BakeRequest& request) {
+  glm::dvec3 low(source.positions[0]);
+  glm::dvec3 high(low);
+  for (const glm::dvec3& p : source.positions) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+  const glm::dvec3 sides = high - low;
+  const double usual = kClipBound * std::max({sides.x, sides.y, sides.z});
+  const MaxError& wanted = request.max_error;
+  double bound = usual;
+  if (wanted.unit == MaxError::Unit::kSource) bound = wanted.value;
+  if (wanted.unit == MaxError::Unit::kPercent) bound = wanted.value / 100 * glm::length(sides);
+  if (wanted.unit == MaxError::Unit::kMetres && request.unit_metres > 0) {
+    bound = wanted.value / request.unit_metres;
+  }
+  return std::min(bound, usual);
+}
+
+/// Reads a model, with what its clips come to; without them where they move nothing that shows.
+Result<SourceModel> read_moving(const ModelRequest& model, const BakeRequest& request,
+                                ModelMovement& movement) {
+  ReadOptions options = {request.jobs, own_picture(model, request), request.within};
+  MODAR_ASSIGN(SourceModel source, read_model(model.path, options));
+  source.name = model.name;
+  if (source.movement.clips.empty()) return source;
+  // A repair cuts and closes what only the pose of the file tears.
+  if (!request.repair) {
+    movement.fitted =
+        fit_movement(source, clip_bound(source, request), request.jobs, source.diagnostics);
+  }
+  if (movement.fitted.clips.empty()) {
+    options.clips = false;
+    MODAR_ASSIGN(source, read_model(model.path, options));
+    source.name = model.name;
+    return source;
+  }
+  source.diagnostics.push_back(clips_found(model.name, movement.fitted));
+  movement.source = std::move(source.movement);
+  return source;
+}
+
 Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& request,
                                   TextureUses& textures, Report& report, BakeTrace& trace) {
   StageTimer reading(report, "read");
-  Result<SourceModel> source =
-      read_model(model.path, {request.jobs, own_picture(model, request), request.within});
+  ModelMovement movement;
+  Result<SourceModel> source = read_moving(model, request, movement);
   if (!source) return tl::unexpected(source.error());
-  source->name = model.name;
   report.diagnostics.insert(report.diagnostics.end(), source->diagnostics.begin(),
                             source->diagnostics.end());
   note_files(*source, trace.files);
@@ -225,7 +282,7 @@ Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& 
       *mesh,
       {rotation_of(report.uprights.back().axis, {}), request.textures.max_side, request.jobs},
       report));
-  WeldedModel welded{std::move(*mesh), {}};
+  WeldedModel welded{std::move(*mesh), std::move(movement), {}};
   welded.uses = collect_textures(welded.mesh, textures);
   return welded;
 }
@@ -315,9 +372,9 @@ Result<std::vector<PackedMesh>> pack_proxies(const ChunkedMesh& mesh,
   return all;
 }
 
-/// Splits and packs a model as finely as requested.
+/// Splits and packs a model as finely as requested. moving: it has clips.
 Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& texture_sides,
-                                const BakeRequest& request, Report& report) {
+                                const BakeRequest& request, bool moving, Report& report) {
   const Result<double> max_error = max_error_of(request, mesh);
   if (!max_error) return tl::unexpected(max_error.error());
   const Result<PositionPlan> plan = plan_positions(mesh, {request.positions, *max_error});
@@ -327,15 +384,18 @@ Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& 
   chunk_options.max_vertices = chunk_vertices_for(mesh.positions.size());
   Result<ChunkedMesh> chunked = chunk(std::move(mesh), chunk_options, report);
   if (!chunked) return tl::unexpected(chunked.error());
-  if (request.occlusion) {
+  // Occlusion is of one pose.
+  if (request.occlusion && !moving) {
     chunked->mesh.occlusion = measure_occlusion(*chunked, request.jobs, report);
   }
   LevelOptions level_options;
-  level_options.levels = request.levels;
+  // Joints bend what is flat in the pose that is stored: coarser levels would lack its folds.
+  level_options.levels = chunked->mesh.vertex_bones.empty() ? request.levels : 1;
   level_options.positions = plan->kind;
   level_options.jobs = request.jobs;
   level_options.texture_sides = texture_sides;
-  const ProxyPlan proxies = plan_proxies(*chunked, level_options);
+  // Chunks of proxies have several parts.
+  const ProxyPlan proxies = moving ? ProxyPlan() : plan_proxies(*chunked, level_options);
   if (!proxies.halvings.empty()) level_options.most_halvings = proxies.halvings[0] - 1;
   level_options.start = proxies.start;
   MODAR_ASSIGN(const std::vector<ProxyStart> starts, make_levels(*chunked, level_options, report));
@@ -374,9 +434,11 @@ Result<void> add_model(WeldedModel welded, const std::vector<TextureOutcome>& ou
     if (textures[m].constant) fold_constant(textures[m].rgba, material);
     seen_through.push_back(blended(material, content));
   }
-  cut_crossing(welded.mesh, seen_through);
-  MODAR_ASSIGN(ShapedModel shaped, shape_model(std::move(welded.mesh), sides, request, report));
-  merge_model(std::move(shaped.model), textures, content);
+  const bool moving = !welded.movement.fitted.clips.empty();
+  if (!moving) cut_crossing(welded.mesh, seen_through);
+  MODAR_ASSIGN(ShapedModel shaped,
+               shape_model(std::move(welded.mesh), sides, request, moving, report));
+  merge_model(std::move(shaped.model), textures, welded.movement, content);
   for (PackedMesh& packed : shaped.proxies) merge_proxy(std::move(packed), content);
   add_draw_orders(content);
   return {};
@@ -512,6 +574,10 @@ void finish_content(BundleContent& content) {
   clear_tiny("NodeRecord", content.nodes);
   clear_tiny("ActionRecord", content.actions);
   clear_tiny("MediaRecord", content.media);
+  clear_tiny("ClipRecord", content.clips);
+  clear_tiny("JointRecord", content.joints);
+  clear_tiny("BoneRecord", content.bones);
+  clear_tiny("PartRecord", content.parts);
   clear_tiny("ChunkRecord", content.proxy_chunks);
   clear_tiny("LevelRecord", content.proxy_levels);
   content.summary = content_summary_of(content);
@@ -553,6 +619,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, B
     content.scenes.push_back(place_scene(resolved, content, known.pattern, model));
     named.scenes.push_back(std::move(resolved));
   }
+  MODAR_TRY(add_scene_clips(named.scenes, content));
   MODAR_TRY(add_nodes(named, content, report));
   MODAR_TRY(light_scenes(named.scenes, named, content, report));
   content.meta = bundle_meta(named, report, traced);

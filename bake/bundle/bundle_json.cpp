@@ -120,6 +120,19 @@ Json level_list(const BundleView& bundle, std::uint32_t index) {
   return list;
 }
 
+Json clip_list(const BundleView& bundle, std::uint32_t model) {
+  Json list = Json::array();
+  for (std::uint32_t c = 0; c < bundle.clips().size(); ++c) {
+    const ClipRecord& clip = bundle.clips()[c];
+    if (clip.model != model) continue;
+    list.push_back({{"name", bundle.name(clip.name)},
+                    {"seconds", clip.seconds},
+                    {"error", static_cast<double>(clip.error) * bundle.models()[model].scale},
+                    {"bytes", bundle.section(SectionType::kClipTracks, c).size()}});
+  }
+  return list;
+}
+
 Json model_json(const BundleView& bundle, std::uint32_t index) {
   const ModelRecord& model = bundle.models()[index];
   const std::uint64_t bytes = model_bytes(bundle, index);
@@ -163,6 +176,7 @@ Json model_json(const BundleView& bundle, std::uint32_t index) {
           {"uv_error_max_texels", model.uv_error_max_texels},
           {"uv_error_rms_texels", model.uv_error_rms_texels},
           {"up", upright ? upright_json(*upright) : Json()},
+          {"clips", clip_list(bundle, index)},
           {"topology", topology ? topology_json(*topology) : Json()},
           {"repair", repair ? defects_json(*repair) : Json()},
           {"levels", std::move(level_figures)}};
@@ -312,6 +326,8 @@ std::string bundle_meta(const BakeRequest& request, const Report& report, const 
                    {"centred", scene.centred},
                    {"offset_sides", Json::list(scene.offset.value)}};
     if (!scene.light.empty()) stated.set("light", file_name(scene.light));
+    if (!scene.clip.empty()) stated.set("clip", scene.clip);
+    if (scene.once) stated.set("once", true);
     scenes.push_back(std::move(stated));
   }
   Json meta = {{"tool", "modar " + request.tool_version},

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "bake/bundle/bundle_json.hpp"
+#include "bake/bundle/clip_records.hpp"
 #include "bake/bundle/scene/scene_nodes.hpp"
 #include "bake/bundle/scene/scene_placement.hpp"
 #include "formats/base/ranges.hpp"
@@ -62,6 +63,7 @@ class Linker {
     }
     ranges::sort(content_.occlusion, {}, &OcclusionRecord::layout);
     Report quiet;
+    MODAR_TRY(add_scene_clips(resolved.scenes, content_));
     MODAR_TRY(add_nodes(resolved, content_, quiet, media));
     MODAR_TRY(light_scenes(resolved.scenes, resolved, content_, quiet));
     Json meta = Json::parse(bundle_meta(resolved, {}, {}));
@@ -186,6 +188,34 @@ class Linker {
     }
     content_.models.push_back(record);
     models_.push_back(stated_entry(part, "models"));
+    add_movement(part, record.first_material - source.first_material);
+  }
+
+  /// Of the model that was added last.
+  void add_movement(const BundleView& part, std::uint32_t materials) {
+    const auto model = static_cast<std::uint32_t>(content_.models.size() - 1);
+    const auto first_joint = static_cast<std::uint32_t>(content_.joints.size());
+    const auto first_bone = static_cast<std::uint32_t>(content_.bones.size());
+    for (JointRecord joint : part.joints()) {
+      joint.model = model;
+      if (joint.parent != kNone) joint.parent += first_joint;
+      content_.joints.push_back(joint);
+    }
+    for (BoneRecord bone : part.bones()) {
+      bone.joint += first_joint;
+      content_.bones.push_back(bone);
+    }
+    for (PartRecord moving : part.moving_parts()) {
+      moving.material += materials;
+      moving.first_bone += first_bone;
+      content_.parts.push_back(moving);
+    }
+    for (ClipRecord clip : part.clips()) {
+      const auto bytes = part.section(SectionType::kClipTracks, clip.tracks);
+      clip.name = content_.intern(part.name(clip.name));
+      clip.model = model;
+      add_clip(clip, {bytes.begin(), bytes.end()}, content_);
+    }
   }
 
   void add_parameter_sets(const BundleView& part) {

@@ -321,7 +321,8 @@ void add_input_options(CommandLine& line, BakeCommand& command) {
       "Which model is on which pattern (required if there are several of either), and how: "
       "height=120mm or width=80mm or scale=0.8 (of the pattern's longest side), up=x|y|z|-x|-y|-z, "
       "turn=DEGREES or turn=X:Y:Z, offset=X:Y:Z (in mm if the pattern's width is known, else in "
-      "longest sides), centred, light=FILE",
+      "longest sides), centred, light=FILE, clip=NAME (of the model's; none: it keeps still), once "
+      "(the clip does not loop)",
       {.type = "PATTERN=MODEL[,KEY=VALUE...]"});
   line.option("-o,--output", &command.output, "Bundle to write", {.type = "OUT.modar"});
 }

@@ -42,6 +42,12 @@ void print_models(const BundleView& bundle) {
     if (const std::string levels = level_words(bundle, m); !levels.empty()) {
       std::printf("  %s\n", levels.c_str());
     }
+    for (const ClipRecord& clip : bundle.clips()) {
+      if (clip.model != m) continue;
+      std::printf("  clip %s: %.3g s, error %.2g\n", std::string(bundle.name(clip.name)).c_str(),
+                  static_cast<double>(clip.seconds),
+                  static_cast<double>(clip.error) * model.scale);
+    }
   }
 }
 

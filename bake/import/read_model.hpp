@@ -30,6 +30,7 @@ struct ReadOptions {
   /// pattern.
   bool own_picture = true;
   std::string within = "";  ///< as in ModelFolder
+  bool clips = true;        ///< false: all stays in the pose of the file
 };
 
 /// Errors: those of the reader; kUnsupported "model.format" that lists what can be read.

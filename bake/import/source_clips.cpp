@@ -57,4 +57,18 @@ glm::dvec4 SourceTrack::at(double time) const {
                 (3 * s2 - 2 * s3) * value(key + 1) + span * (s3 - s2) * arriving);
 }
 
+std::array<std::uint8_t, 4> VertexBones::bytes() const {
+  std::array<std::uint8_t, 4> result{};
+  std::size_t most = 0;
+  int rest = 255;
+  for (std::size_t i = 0; i < 4; ++i) {
+    result[i] = static_cast<std::uint8_t>(std::lround(weights[i] * 255.0f));
+    rest -= result[i];
+    if (weights[i] > weights[most]) most = i;
+  }
+  // Rounding leaves at most two, and the greatest of four that sum to 255 is above.
+  result[most] = static_cast<std::uint8_t>(result[most] + rest);
+  return result;
+}
+
 }  // namespace modar

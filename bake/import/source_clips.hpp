@@ -1,6 +1,7 @@
 // The joints of a model file and the clips that move them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -52,6 +53,33 @@ struct SourceClip {
   std::string name;
   double duration = 0;  ///< seconds: the last time of its tracks
   std::vector<SourceTrack> tracks;
+};
+
+/// What turns vertices: from the place where they are stored, in the scene, to the joint's space.
+struct SourceBone {
+  std::uint32_t joint = 0;
+  glm::dmat4 inverse{1.0};
+};
+
+/// Faces of one material that move with at most kMostPartBones bones.
+struct SourcePart {
+  std::vector<SourceBone> bones;
+};
+
+/// Of a vertex: bones of its part, and the share of each; the sum is 1.
+struct VertexBones {
+  std::array<std::uint8_t, 4> bones{};
+  std::array<float, 4> weights{1.0f, 0.0f, 0.0f, 0.0f};
+
+  /// In 255ths, whose sum is 255.
+  [[nodiscard]] std::array<std::uint8_t, 4> bytes() const;
+};
+
+/// How a model moves.
+struct SourceMovement {
+  std::vector<SourceJoint> joints;  ///< parents first
+  std::vector<SourceClip> clips;
+  std::vector<SourcePart> parts;  ///< SourceMaterial::part counts them
 };
 
 }  // namespace modar

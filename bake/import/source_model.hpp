@@ -60,6 +60,7 @@ struct SourceMaterial {
   NormalMap normal;
   bool two_sided = false;
   bool whitened = false;     ///< its file states a gray for its picture, which is shown unchanged
+  std::uint32_t part = 0xFFFFFFFFu;  ///< of SourceMovement, whose faces it has; else nothing moves
   bool see_through = false;  ///< its picture has alpha; unknown (false) until it has been read
   /// Named "occluder": represents a real object, hides content behind it and is invisible itself.
   [[nodiscard]] bool occluder() const { return name == "occluder"; }
@@ -113,10 +114,8 @@ struct SourceModel {
   std::vector<FaceRun> material_runs;
   std::vector<FaceRun> smoothing_runs;
   std::vector<SourceMaterial> materials;
-  std::vector<SourceJoint> joints;  ///< parents first
-  std::vector<SourceClip> clips;
-  std::vector<FaceRun>
-      joint_runs;  ///< joints that faces move with, or kNoJoint; without clips empty
+  SourceMovement movement;          ///< without clips empty
+  Array<VertexBones> vertex_bones;  ///< one a position where a part has several bones, else empty
   std::vector<Diagnostic> diagnostics;
   std::uint64_t lost_faces = 0;  ///< that the file states and the reader could not use
   Account account;               ///< weld() adds faces and unused materials

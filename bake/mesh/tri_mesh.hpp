@@ -39,6 +39,7 @@ struct TriMesh {
   /// longer side of the texture: texels), so that neighbours on one picture are still neighbours.
   Array<glm::dvec2> picture_uvs;
   Array<glm::u8vec4> colours;
+  Array<VertexBones> vertex_bones;
   Array<std::uint8_t> occlusion;  ///< see measure_occlusion(); only where it was measured
   Array<std::array<std::uint32_t, 3>> triangles;
   Array<std::uint32_t> triangle_material;

@@ -68,6 +68,9 @@ struct SceneOffset {
 };
 
 /// A scene as the user asks for it.
+/// SceneRequest::clip of a model that keeps still, unless it has a clip of that name.
+inline constexpr const char* kNoClip = "none";
+
 struct SceneRequest {
   std::string pattern;  ///< names, see name_assets()
   std::string model;
@@ -80,6 +83,8 @@ struct SceneRequest {
   std::string name;     ///< what actions call it; empty: as the model
   bool hidden = false;  ///< until an action shows it
   std::string group;    ///< of variants that `next` cycles through; empty: none
+  std::string clip;     ///< that the model plays, or kNoClip; empty: its first
+  bool once = false;    ///< the clip ends; else it loops
 };
 
 /// Words by language: {"en", "The rim"}.

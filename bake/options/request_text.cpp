@@ -50,7 +50,7 @@ tl::unexpected<Error> scene_error(const std::string& text, const std::string& ca
                                   const std::string& cure =
                                       "write PATTERN=MODEL, then any of ,height=120mm ,width=80mm "
                                       ",scale=0.8 ,up=y ,turn=90 ,offset=X:Y:Z ,centred "
-                                      ",light=FILE") {
+                                      ",light=FILE ,clip=NAME ,once") {
   return fail(ExitCode::kUsage, "cli.scene", "--scene " + text, cause, cure);
 }
 
@@ -248,6 +248,10 @@ tl::expected<bool, WrongValue> parse_scene_part(std::string_view key, std::strin
     scene.offset = *offset;
     return true;
   }
+  if (key == "clip" && !value.empty()) {
+    scene.clip = std::string(value);
+    return true;
+  }
   if (key == "light" && !value.empty()) {
     scene.light = std::string(value);
     return true;
@@ -386,8 +390,8 @@ Result<SceneRequest> parse_scene(const std::string& text) {
   for (std::size_t i = 1; i < parts.size(); ++i) {
     const std::string_view part = parts[i];
     const std::string_view key = part.substr(0, part.find('='));
-    if (part == "centred") {
-      scene.centred = true;
+    if (part == "centred" || part == "once") {
+      (part == "once" ? scene.once : scene.centred) = true;
       continue;
     }
     const bool valued = key.size() < part.size();

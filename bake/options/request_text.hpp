@@ -55,7 +55,7 @@ tl::expected<void, WrongValue> parse_command(std::string_view text, ActionReques
 tl::expected<void, WrongValue> parse_alpha(std::string_view text, NodeRequest& node);
 
 /// "PATTERN=MODEL[,scale=S|,height=120mm|,width=80mm][,up=y][,turn=90][,offset=X:Y:Z][,centred]
-/// [,light=FILE]". Errors: kUsage "cli.scene".
+/// [,light=FILE][,clip=NAME][,once]". Errors: kUsage "cli.scene".
 Result<SceneRequest> parse_scene(const std::string& text);
 
 /// "FILE" or "NAME=FILE".

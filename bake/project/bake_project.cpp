@@ -303,6 +303,7 @@ class ProjectBake {
     for (const auto& [language, words] : scene.texts) text += "\n" + language + " " + words;
     for (const auto& [language, words] : scene.alts) text += "\nalt " + language + " " + words;
     text += "\n" + request.name + (request.hidden ? " h " : " ") + request.group;
+    text += "\n" + request.clip + (request.once ? " once" : "");
     for (const NodeRequest& node : scene.nodes) text += node_text(node);
     for (const ActionRequest& action : scene.actions) text += action_text(action);
     return text + "\n";

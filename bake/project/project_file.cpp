@@ -552,7 +552,8 @@ class ProjectReader {
     MODAR_TRY(
         told(reader.allow({"pattern", "model",   "scale", "height", "width", "up",    "turn",
                            "offset",  "centred", "light", "text",   "alt",   "name",  "hidden",
-                           "group",   "picture", "video", "sound",  "label", "action"})));
+                           "group",   "picture", "video", "sound",  "label", "action", "clip",
+                           "once"})));
     ProjectScene scene;
     scene.table = table;
     scene.where = reader.where();
@@ -568,6 +569,8 @@ class ProjectReader {
     MODAR_TRY(reader.take("centred", scene.request.centred));
     scene.request.light = project_.light;
     MODAR_TRY(take_file(reader, "light", scene.request.light));
+    MODAR_TRY(reader.take("clip", scene.request.clip));
+    MODAR_TRY(reader.take("once", scene.request.once));
     MODAR_TRY(reader.take("text", scene.texts));
     MODAR_TRY(reader.take("alt", scene.alts));
     project_.scenes.push_back(std::move(scene));

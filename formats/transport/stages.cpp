@@ -97,6 +97,7 @@ LoadStage stage_of(SectionType type) {
     // Opening a bundle reads these.
     case SectionType::kShadow:
     case SectionType::kDrawOrder:
+    case SectionType::kClipTracks:
       return LoadStage::kFind;
     default:
       return LoadStage::kRefine;

@@ -38,6 +38,9 @@ std::uint32_t location_of(Semantic semantic) {
       return kAttributeUv;
     case Semantic::kColour:
       return kAttributeColour;
+    case Semantic::kJoints:
+    case Semantic::kWeights:
+      break;
   }
   return kAttributeCount;
 }

@@ -139,6 +139,14 @@ constexpr CorruptCase kSectionCases[] = {
          record_of<ProxyRecord>(b, SectionType::kProxies, 1).model = 3;
        });
      }},
+    {"BUNDLE_CLIP",
+     [] {
+       BundleContent content = scene_content();
+       add_clips(content);
+       return damaged(content, [](Bytes& b) {
+         record_of<JointRecord>(b, SectionType::kJoints, 1).parent = 1;
+       });
+     }},
     {"BUNDLE_LEVEL_RANGE",
      [] {
        return damaged(model_content(), [](Bytes& b) {

@@ -183,6 +183,8 @@ constexpr CorruptCase kPayloadCases[] = {
      }},
     {"VERTEX_OCCLUSION",
      [] { return changed(lit_content(), [](auto& c) { c.vertices[11] = std::byte{128}; }); }},
+    {"VERTEX_BONES",
+     [] { return changed(skinned_content(), [](auto& c) { c.vertices[20] = std::byte{7}; }); }},
     {"VERTEX_PADDING", [] { return vertex_damage(6, std::byte{1}, std::byte{0}); }},
     {"PATTERN_YML_DIFFERS",
      [] {

@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <string>
+#include <utility>
 
 #include "formats/colour_grid.hpp"
 #include "formats/draw_order.hpp"
@@ -592,6 +593,84 @@ void add_nodes(BundleContent& content) {
                  R"("title":{"en":"The rim"},"text":{"en":"Chipped."}},)"
                  R"({"pattern":"box","node":"voice","captions":)"
                  R"({"en":"WEBVTT\n\n00:00.500 --> 00:02.000\nA pot.\n"}}]})";
+}
+
+namespace {
+
+/// A turn of half a circle about z, then a move along x: two tracks of two and one key.
+Bytes tracks_of_clip() {
+  Bytes bytes;
+  put(bytes, ClipTracksHeader{2, 121, {0, 0}});
+  put(bytes, TrackRecord{0, 2, 0, 2, 96, {0, 0, 0}, {0, 0, 0}, 0});
+  put(bytes, TrackRecord{1, 1, 0, 1, 112, {0, 0.25f, 0}, {0.5f, 0, 0}, 0});
+  for (const int sample : {0, 120}) put(bytes, static_cast<std::uint16_t>(sample));
+  for (const auto& rotation : {std::array<double, 4>{0, 0, 0, 1}, {0, 0, 1, 0}}) {
+    for (const std::uint16_t word : pack_rotation(rotation)) put(bytes, word);
+  }
+  for (const int word : {0, 1, 0, 0}) put(bytes, static_cast<std::uint16_t>(word));
+  return bytes;
+}
+
+}  // namespace
+
+void add_clips(BundleContent& content) {
+  ModelRecord& model = content.models[2];
+  model.first_material = static_cast<std::uint32_t>(content.materials.size());
+  model.material_count = 1;
+  add_material(content, "arm", kNone);
+  for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+    content.chunks[model.first_chunk + c].material = model.first_material;
+  }
+  JointRecord joint{};
+  joint.model = 2;
+  joint.parent = kNone;
+  joint.rotation[3] = 1;
+  for (int i = 0; i < 3; ++i) joint.before[5 * i] = joint.scale[i] = 1;
+  content.joints = {joint, joint};
+  content.joints[1].parent = 0;
+  content.joints[1].translation[1] = 0.25f;
+  BoneRecord bone{};
+  bone.joint = 1;
+  for (int i = 0; i < 3; ++i) bone.inverse[5 * i] = 1;
+  bone.inverse[7] = -0.25f;
+  content.bones = {bone};
+  content.parts = {{model.first_material, 0, 1, 0, {-1.5f, -1.5f, -1}, {1.5f, 1.5f, 1}}};
+  const NameRef wave = content.intern("wave");
+  const NameRef again = content.intern("wave again");
+  content.clips = {{wave, 2, 0, 1, 0.0009765625f, {0, 0}}, {again, 2, 0, 2, 0.0009765625f, {0, 0}}};
+  content.clip_tracks = {tracks_of_clip(), {}};
+  content.scene_clips = {{0, 1, kSceneClipLoops, 0}};
+}
+
+BundleContent skinned_content() {
+  BundleContent content = model_content();
+  LayoutRecord& layout = content.layouts[0];
+  const std::uint16_t stride = layout.stride;
+  layout.attributes[layout.attribute_count++] = {6, 5, 4, 0, stride, 0};
+  layout.attributes[layout.attribute_count++] = {7, 5, 4, 1, static_cast<std::uint16_t>(stride + 4),
+                                                 0};
+  layout.stride = static_cast<std::uint16_t>(stride + 8);
+  Bytes vertices;
+  for (std::size_t v = 0; v < content.vertices.size(); v += stride) {
+    vertices.insert(vertices.end(), content.vertices.begin() + static_cast<std::ptrdiff_t>(v),
+                    content.vertices.begin() + static_cast<std::ptrdiff_t>(v + stride));
+    for (const int byte : {1, 0, 0, 0, 200, 55, 0, 0}) {
+      vertices.push_back(static_cast<std::byte>(byte));
+    }
+  }
+  content.vertices = std::move(vertices);
+  JointRecord joint{};
+  joint.parent = kNone;
+  joint.rotation[3] = 1;
+  BoneRecord bone{};
+  for (int i = 0; i < 3; ++i) joint.before[5 * i] = joint.scale[i] = bone.inverse[5 * i] = 1;
+  content.joints = {joint, joint};
+  content.bones = {bone, bone};
+  content.bones[1].joint = 1;
+  content.parts = {{0, 0, 2, 0, {-2, -2, -2}, {2, 2, 2}}};
+  content.clips = {{content.intern("wave"), 0, 0, 1, 0.0009765625f, {0, 0}}};
+  content.clip_tracks = {tracks_of_clip()};
+  return content;
 }
 
 BundleContent acting_content() {

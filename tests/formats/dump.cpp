@@ -127,7 +127,8 @@ void add_digests(const BundleView& view, const LayoutRecord& layout, const Chunk
     for (std::size_t v = 0; v < level.vertex_count; ++v) {
       append_decoded(attribute, chunk, first + v * layout.stride, values);
     }
-    const char* names[] = {"", "positions", "normals", "uvs", "colours", "normals"};
+    const char* names[] = {"", "positions", "normals", "uvs", "colours", "normals",
+                           "joints", "weights"};
     out[names[attribute.semantic]] = digest(values.data(), values.size() * sizeof(double));
   }
   out["indices"] = digest(view.indices().subspan(level.index_offset, level.index_count * 2));
@@ -344,6 +345,56 @@ json dump_media(const BundleView& view) {
   return rows;
 }
 
+json dump_clips(const BundleView& view) {
+  json rows = json::array();
+  for (const ClipRecord& record : view.clips()) {
+    json out = {{"name", view.name(record.name)}};
+    GET(model), GET(tracks), GET(seconds), GET(error);
+    rows.push_back(out);
+  }
+  return rows;
+}
+
+json dump_joints(const BundleView& view) {
+  json rows = json::array();
+  for (const JointRecord& record : view.joints()) {
+    json out;
+    GET(model), GET(parent), GET(before), GET(translation), GET(rotation), GET(scale);
+    rows.push_back(out);
+  }
+  return rows;
+}
+
+json dump_bones(const BundleView& view) {
+  json rows = json::array();
+  for (const BoneRecord& record : view.bones()) {
+    json out;
+    GET(joint), GET(inverse);
+    rows.push_back(out);
+  }
+  return rows;
+}
+
+json dump_parts(const BundleView& view) {
+  json rows = json::array();
+  for (const PartRecord& record : view.moving_parts()) {
+    json out;
+    GET(material), GET(first_bone), GET(bone_count), GET(bounds_min), GET(bounds_max);
+    rows.push_back(out);
+  }
+  return rows;
+}
+
+json dump_scene_clips(const BundleView& view) {
+  json rows = json::array();
+  for (const SceneClipRecord& record : view.scene_clips()) {
+    json out;
+    GET(scene), GET(clip), GET(flags);
+    rows.push_back(out);
+  }
+  return rows;
+}
+
 json dump_actions(const BundleView& view) {
   json rows = json::array();
   for (std::uint32_t i = 0; i < view.actions().size(); ++i) {
@@ -409,6 +460,11 @@ json dump(const BundleView& view) {
           {"nodes", dump_nodes(view)},
           {"actions", dump_actions(view)},
           {"media", dump_media(view)},
+          {"clips", dump_clips(view)},
+          {"joints", dump_joints(view)},
+          {"bones", dump_bones(view)},
+          {"parts", dump_parts(view)},
+          {"scene_clips", dump_scene_clips(view)},
           {"features", features}};
 }
 

@@ -44,8 +44,8 @@ std::string quoted(const std::string& path) {
 }
 
 /// A released file never changes. Version 1.1 is 1.0 and a content summary, 1.2 that with light,
-/// occlusion, a shadow and shapes of patterns, 1.3 that with nodes and actions, so its writer makes
-/// all.
+/// occlusion, a shadow and shapes of patterns, 1.3 that with nodes and actions, 1.4 that
+/// with clips, so its writer makes all.
 TEST(GoldenFiles, WriterMakesTheReleasedBytes) {
   BundleContent content = golden_content();
   EXPECT_EQ(encode(content), read_file(source_path("tests/golden/v1_0.modar")));
@@ -58,10 +58,14 @@ TEST(GoldenFiles, WriterMakesTheReleasedBytes) {
   content.summary.clear();
   content.summary = content_summary_of(content);
   EXPECT_EQ(encode(content), read_file(source_path("tests/golden/v1_3.modar")));
+  add_clips(content);
+  content.summary.clear();
+  content.summary = content_summary_of(content);
+  EXPECT_EQ(encode(content), read_file(source_path("tests/golden/v1_4.modar")));
 }
 
 class Golden : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Versions, Golden, ::testing::Values("v1_0", "v1_1", "v1_2", "v1_3"));
+INSTANTIATE_TEST_SUITE_P(Versions, Golden, ::testing::Values("v1_0", "v1_1", "v1_2", "v1_3", "v1_4"));
 
 TEST_P(Golden, BothReadersDecodeTheSame) {
   const std::string path = source_path(std::string("tests/golden/") + GetParam() + ".modar");

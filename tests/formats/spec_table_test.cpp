@@ -146,6 +146,15 @@ std::map<std::string, Struct> compiled() {
   MODAR_STRUCT(ActionRecord, F(event), F(command), F(source), F(target), F(part), F(address),
                F(seconds), F(duration), F(axis), F(degrees), F(reserved))
   MODAR_STRUCT(ProxyRecord, F(model), F(first_chunk), F(chunk_count), F(reserved))
+  MODAR_STRUCT(ClipRecord, F(name), F(model), F(tracks), F(seconds), F(error), F(reserved))
+  MODAR_STRUCT(JointRecord, F(model), F(parent), F(before), F(translation), F(rotation), F(scale))
+  MODAR_STRUCT(BoneRecord, F(joint), F(reserved), F(inverse))
+  MODAR_STRUCT(PartRecord, F(material), F(first_bone), F(bone_count), F(reserved), F(bounds_min),
+               F(bounds_max))
+  MODAR_STRUCT(SceneClipRecord, F(scene), F(clip), F(flags), F(reserved))
+  MODAR_STRUCT(ClipTracksHeader, F(track_count), F(sample_count), F(reserved))
+  MODAR_STRUCT(TrackRecord, F(joint), F(path), F(reserved0), F(key_count), F(keys), F(low),
+               F(step), F(reserved1))
   MODAR_STRUCT(ColourGridHeader, F(columns), F(rows), F(reserved))
   MODAR_STRUCT(PatternShapeHeader, F(kind), F(face_count), F(half_arc), F(slope), F(reserved))
   MODAR_STRUCT(ShapeFaceRecord, F(place), F(corner), F(right), F(down), F(reserved))

@@ -41,6 +41,8 @@ Bytes small_sound(std::uint32_t seconds);
 
 /// Adds what version 1.3 added to that: nodes of each kind, actions of each event and command.
 void add_nodes(BundleContent& content);
+/// Two clips of the third model of golden_content(), which share their tracks; a scene plays one.
+void add_clips(BundleContent& content);
 /// Adds what version 1.3 added to a content of three octahedra: two proxies of the first, of
 /// which one has two chunks, and one of the third.
 void add_proxies(BundleContent& content);
@@ -48,6 +50,8 @@ void add_proxies(BundleContent& content);
 /// A golden_content() with all that version 1.2 added, and no section of an unknown type.
 BundleContent lit_content();
 
+/// A model_content() whose vertices name two bones.
+BundleContent skinned_content();
 /// A lit_content() with nodes and actions.
 BundleContent acting_content();
 

@@ -13,6 +13,7 @@ int main(int count, char** arguments) {
   modar::BundleContent content = modar::test::golden_content();
   modar::test::add_looks(content);
   modar::test::add_nodes(content);
+  modar::test::add_clips(content);
   content.summary = modar::content_summary_of(content);
   const modar::test::Bytes bytes = modar::test::encode(content);
   return modar::write_file(arguments[1], bytes) ? 0 : 2;

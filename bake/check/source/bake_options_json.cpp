@@ -69,6 +69,8 @@ void read_scenes(const Json& document, BakeRequest& request) {
     scene.offset.unit = SceneOffset::Unit::kSide;
     take_three(stated, "offset_sides", scene.offset.value);
     scene.light = source_picture(request, text_in(stated, "light"));
+    scene.clip = text_in(stated, "clip");
+    scene.once = stated.find("once").value_or(Json()).truth().value_or(false);
     if (is_given(request.models, scene.model) && is_given(request.patterns, scene.pattern)) {
       request.scenes.push_back(scene);
     }

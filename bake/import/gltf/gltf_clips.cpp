@@ -64,7 +64,9 @@ Reason read_channel(const tinygltf::Model& gltf, const tinygltf::Animation& anim
                     const tinygltf::AnimationChannel& channel, SourceTrack& track) {
   const auto path = path_of(channel.target_path);
   if (!path)
-    return channel.target_path == "weights" ? "weights of morph targets" : "an unknown target";
+    return channel.target_path == "weights"   ? "weights of morph targets"
+           : channel.target_path == "pointer" ? "values that KHR_animation_pointer names"
+                                              : "an unknown target";
   track.path = *path;
   const bool known =
       channel.target_node >= 0 && static_cast<std::size_t>(channel.target_node) < gltf.nodes.size();
@@ -92,7 +94,29 @@ JointPlace rest_of(const tinygltf::Node& node) {
     if (i < 3 && node.translation.size() == 3) place.translation[i] = node.translation[k];
     if (i < 3 && node.scale.size() == 3) place.scale[i] = node.scale[k];
   }
+  place.rotation = glm::normalize(place.rotation);
   return place;
+}
+
+/// Whether a track leaves its node in its place: exporters write one for each bone.
+bool is_still(const SourceTrack& track, const tinygltf::Node& node) {
+  const JointPlace place = rest_of(node);
+  glm::dvec4 rest = place.rotation;
+  if (track.path == TrackPath::kTranslation) rest = glm::dvec4(place.translation, 0.0);
+  if (track.path == TrackPath::kScale) rest = glm::dvec4(place.scale, 0.0);
+  const double most = 1e-6 * glm::length(rest);
+  const bool cubic = track.interpolation == Interpolation::kCubic;
+  for (std::size_t i = 0; i < track.values.size(); ++i) {
+    const bool tangent = cubic && i % 3 != 1;
+    const glm::dvec4& value = track.values[i];
+    const bool turns = track.path == TrackPath::kRotation && !tangent;
+    const glm::dvec4 at = turns ? glm::normalize(value) : value;
+    const glm::dvec4 wanted = tangent ? glm::dvec4(0.0) : rest;
+    if (!(glm::distance(at, wanted) <= most) && !(turns && glm::distance(-at, wanted) <= most)) {
+      return false;
+    }
+  }
+  return true;
 }
 
 /// Numbers the moved nodes below `roots`, parents first.
@@ -101,6 +125,7 @@ class JointFinder {
   JointFinder(const tinygltf::Model& gltf, const std::vector<bool>& moved, GltfClips& clips)
       : gltf_(gltf), moved_(moved), clips_(clips), joint_of_(gltf.nodes.size(), kNoJoint) {
     clips_.node_joints.assign(gltf.nodes.size(), kNoJoint);
+    clips_.node_places.assign(gltf.nodes.size(), glm::dmat4(1.0));
   }
 
   /// The reader of the scene refuses nodes that are reached twice, and depths beyond its limit.
@@ -123,11 +148,13 @@ class JointFinder {
       if (moved_[n]) {
         joint_of_[n] = static_cast<std::uint32_t>(clips_.joints.size());
         clips_.joints.push_back({step.joint, step.before, rest_of(node)});
+        clips_.stored.push_back(stored_place(clips_.joints.back()));
         step = {step.node, joint_of_[n], glm::dmat4(1.0)};
       } else {
         step.before = step.before * node_transform(node);
       }
       clips_.node_joints[n] = step.joint;
+      clips_.node_places[n] = step.before;
       for (const int child : node.children) waiting.push_back({child, step.joint, step.before});
     }
   }
@@ -137,6 +164,13 @@ class JointFinder {
   }
 
  private:
+  [[nodiscard]] glm::dmat4 stored_place(const SourceJoint& joint) const {
+    JointPlace place = joint.rest;
+    for (int i = 0; i < 3; ++i) place.scale[i] = place.scale[i] == 0 ? 1 : place.scale[i];
+    const glm::dmat4 own = joint.before * place.matrix();
+    return joint.parent == kNoJoint ? own : clips_.stored[joint.parent] * own;
+  }
+
   const tinygltf::Model& gltf_;
   const std::vector<bool>& moved_;
   GltfClips& clips_;
@@ -148,20 +182,29 @@ struct ReadChannel {
   SourceTrack track;
 };
 
-std::vector<ReadChannel> read_channels(const tinygltf::Model& gltf,
-                                       const tinygltf::Animation& animation, Reason& left_out) {
-  std::vector<ReadChannel> channels;
+struct ReadAnimation {
+  std::vector<ReadChannel> channels;  ///< that move their node
+  double duration = 0;
+  std::size_t read = 0;  ///< channels, the still ones too
+  Reason left_out;
+};
+
+ReadAnimation read_channels(const tinygltf::Model& gltf, const tinygltf::Animation& animation) {
+  ReadAnimation result;
   for (const tinygltf::AnimationChannel& channel : animation.channels) {
     SourceTrack track;
     const Reason reason = read_channel(gltf, animation, channel, track);
     if (!reason.empty()) {
-      if (left_out.find(reason) == Reason::npos)
-        left_out += (left_out.empty() ? "" : ", ") + reason;
+      if (result.left_out.find(reason) == Reason::npos)
+        result.left_out += (result.left_out.empty() ? "" : ", ") + reason;
       continue;
     }
-    channels.push_back({channel.target_node, std::move(track)});
+    ++result.read;
+    result.duration = std::max(result.duration, track.times.back());
+    if (is_still(track, gltf.nodes[static_cast<std::size_t>(channel.target_node)])) continue;
+    result.channels.push_back({channel.target_node, std::move(track)});
   }
-  return channels;
+  return result;
 }
 
 std::string name_of(const tinygltf::Animation& animation, std::size_t number) {
@@ -173,27 +216,42 @@ std::string name_of(const tinygltf::Animation& animation, std::size_t number) {
 GltfClips gltf_clips(const tinygltf::Model& gltf, const std::vector<int>& roots,
                      const std::string& label, std::vector<Diagnostic>& diagnostics) {
   GltfClips result;
-  std::vector<std::vector<ReadChannel>> channels;
+  std::vector<ReadAnimation> animations;
   std::vector<bool> moved(gltf.nodes.size(), false);
-  for (std::size_t i = 0; i < gltf.animations.size(); ++i) {
-    Reason left_out;
-    channels.push_back(read_channels(gltf, gltf.animations[i], left_out));
-    for (const ReadChannel& each : channels.back())
-      moved[static_cast<std::size_t>(each.node)] = true;
-    if (left_out.empty()) continue;
+  const auto warn = [&](const std::string& message, const char* cure) {
     diagnostics.push_back(
-        {"gltf.clip", DiagnosticSeverity::kWarning, label, 0,
-         "animation '" + name_of(gltf.animations[i], i) + "' is kept without: " + left_out,
-         "check the file with the glTF validator and export it again"});
+        {"gltf.clip", DiagnosticSeverity::kWarning, label, 0, message, cure});
+  };
+  for (std::size_t i = 0; i < gltf.animations.size(); ++i) {
+    animations.push_back(read_channels(gltf, gltf.animations[i]));
+    const ReadAnimation& read = animations.back();
+    for (const ReadChannel& each : read.channels) moved[static_cast<std::size_t>(each.node)] = true;
+    if (read.left_out.empty()) continue;
+    const std::string name = "animation '" + name_of(gltf.animations[i], i) + "' ";
+    if (read.read == 0) {
+      warn(name + "is left out, and the pose of the file kept: it moves " + read.left_out,
+           "move nodes or bones instead, and export it again");
+    } else {
+      warn(name + "is kept without " + read.left_out + ", whose values in the file stay",
+           "check the file with the glTF validator and export it again");
+    }
+  }
+  const auto joints = static_cast<std::size_t>(std::count(moved.begin(), moved.end(), true));
+  // One more may represent what nothing moves.
+  if (joints >= kMaxJoints) {
+    warn("its animations move " + std::to_string(joints) + " nodes, more than " +
+             std::to_string(kMaxJoints - 1) + ", and are left out: the pose of the file is kept",
+         "move fewer nodes");
+    moved.assign(moved.size(), false);
+    animations.clear();
   }
   JointFinder finder(gltf, moved, result);
   finder.walk(roots);
-  for (std::size_t i = 0; i < channels.size(); ++i) {
-    SourceClip clip{name_of(gltf.animations[i], i), 0, {}};
-    for (ReadChannel& each : channels[i]) {
+  for (std::size_t i = 0; i < animations.size(); ++i) {
+    SourceClip clip{name_of(gltf.animations[i], i), animations[i].duration, {}};
+    for (ReadChannel& each : animations[i].channels) {
       each.track.joint = finder.joint(each.node);
       if (each.track.joint == kNoJoint) continue;  // in no scene, and nothing of it shows
-      clip.duration = std::max(clip.duration, each.track.times.back());
       clip.tracks.push_back(std::move(each.track));
     }
     std::stable_sort(clip.tracks.begin(), clip.tracks.end(), [](const auto& a, const auto& b) {

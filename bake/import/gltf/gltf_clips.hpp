@@ -1,7 +1,11 @@
 // The animations of a glTF file: nodes that move as joints, channels as tracks.
 #pragma once
 
+#include <cstdint>
+#include <string>
 #include <vector>
+
+#include <glm/mat4x4.hpp>
 
 #include "bake/import/source_clips.hpp"
 #include "bake/report.hpp"
@@ -16,6 +20,10 @@ struct GltfClips {
   std::vector<SourceJoint> joints;
   std::vector<SourceClip> clips;           ///< each has a track
   std::vector<std::uint32_t> node_joints;  ///< of each node: that it moves with, or kNoJoint
+  std::vector<glm::dmat4> node_places;     ///< of each node: to the space of that, or the scene's
+  /// Where each joint is in the scene while its vertices are stored: its rest place, where scales
+  /// of 0, which flatten what they hide, are 1.
+  std::vector<glm::dmat4> stored;
 };
 
 /// Tracks of nodes in the scene that `roots` span. What cannot be read (targets that do not exist,

@@ -1,6 +1,8 @@
 #include "bake/import/gltf/gltf_pose.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -130,6 +132,30 @@ std::optional<glm::dmat4> VertexPlaces::of(std::size_t vertex) const {
   return (*joints_)[static_cast<std::size_t>(sets_.front().joints.at(vertex, 0))];
 }
 
+std::vector<BoneShare> VertexPlaces::shares(std::size_t vertex) const {
+  std::vector<BoneShare> shares;
+  for (const Influences& set : sets_) {
+    for (std::size_t c = 0; c < 4; ++c) {
+      const double weight = set.weights.at(vertex, c);
+      const auto bone = static_cast<std::uint32_t>(set.joints.at(vertex, c));
+      if (!(weight > 0) || !std::isfinite(weight)) continue;
+      const auto same = std::find_if(shares.begin(), shares.end(),
+                                     [bone](const BoneShare& each) { return each.bone == bone; });
+      if (same == shares.end()) {
+        shares.push_back({bone, weight});
+      } else {
+        same->weight += weight;
+      }
+    }
+  }
+  std::stable_sort(shares.begin(), shares.end(),
+                   [](const auto& a, const auto& b) { return a.weight > b.weight; });
+  if (shares.empty()) {
+    shares.push_back({static_cast<std::uint32_t>(sets_.front().joints.at(vertex, 0)), 1.0});
+  }
+  return shares;
+}
+
 SkinPoses::SkinPoses(const tinygltf::Model& gltf) : gltf_(gltf) {
   if (gltf.skins.empty()) return;
   const std::vector<glm::dmat4> places = node_places(gltf);
@@ -149,6 +175,7 @@ SkinPoses::SkinPoses(const tinygltf::Model& gltf) : gltf_(gltf) {
       for (int i = 0; bound && i < 16; ++i) {
         inverse[i / 4][i % 4] = inverses.at(j, static_cast<std::size_t>(i));
       }
+      skin.inverses.push_back(inverse);
       skin.joints.push_back(places[static_cast<std::size_t>(node)] * inverse);
     }
     skins_.push_back(std::move(skin));

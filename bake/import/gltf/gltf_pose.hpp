@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -26,6 +27,12 @@ glm::dmat4 node_transform(const tinygltf::Node& node);
 std::optional<std::vector<glm::dmat4>> node_copies(const tinygltf::Model& gltf,
                                                    const tinygltf::Node& node);
 
+/// How far a vertex follows a joint of its skin.
+struct BoneShare {
+  std::uint32_t bone = 0;
+  double weight = 0;
+};
+
 /// What moves the vertices of a primitive: its node, or the joints of a skin.
 class VertexPlaces {
  public:
@@ -36,6 +43,8 @@ class VertexPlaces {
   /// From the mesh to the scene; vertex: below the number that was bound, or 0 without a skin.
   /// Nothing where the vertex names a joint that its skin has not.
   [[nodiscard]] std::optional<glm::dmat4> of(std::size_t vertex) const;
+  /// The joints of a vertex that of() has a place for, the greatest share first; not empty.
+  [[nodiscard]] std::vector<BoneShare> shares(std::size_t vertex) const;
 
  private:
   friend class SkinPoses;
@@ -59,10 +68,15 @@ class SkinPoses {
   [[nodiscard]] std::optional<VertexPlaces> bind(const tinygltf::Primitive& primitive, int skin,
                                                  std::size_t vertices,
                                                  const glm::dmat4& to_scene) const;
+  /// The inverse bind matrix of a joint of a skin that bind() has found good.
+  [[nodiscard]] const glm::dmat4& inverse(std::size_t skin, std::size_t joint) const {
+    return skins_[skin].inverses[joint];
+  }
 
  private:
   struct Skin {
     bool good = false;
+    std::vector<glm::dmat4> inverses;
     std::vector<glm::dmat4> joints;  // from the bound mesh to the scene
   };
   const tinygltf::Model& gltf_;

@@ -16,9 +16,9 @@
 
 #include "bake/import/conversion.hpp"
 #include "bake/import/gltf/gltf_accessor.hpp"
-#include "bake/import/gltf/gltf_clips.hpp"
 #include "bake/import/gltf/gltf_materials.hpp"
 #include "bake/import/gltf/gltf_meshopt.hpp"
+#include "bake/import/gltf/gltf_parts.hpp"
 #include "bake/import/gltf/gltf_pictures.hpp"
 #include "bake/import/gltf/gltf_pose.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
@@ -47,12 +47,13 @@ struct LeftOut {
 
 class SceneReader {
  public:
-  SceneReader(const tinygltf::Model& gltf, SourceModel& model, std::string label)
+  SceneReader(const tinygltf::Model& gltf, SourceModel& model, std::string label, bool clips)
       : gltf_(gltf),
         model_(model),
         label_(std::move(label)),
         skins_(gltf),
-        seen_(gltf.nodes.size()) {}
+        seen_(gltf.nodes.size()),
+        parts_(gltf, clips ? gltf_clips(gltf, roots(), label_, model.diagnostics) : GltfClips{}) {}
 
   [[nodiscard]] const LeftOut& left_out() const { return left_out_; }
 
@@ -60,7 +61,8 @@ class SceneReader {
   void account() {
     Account& account = model_.account;
     account.colours.used = gltf_.materials.size();
-    account.animations.left_out = gltf_.animations.size();
+    account.animations.used = model_.movement.clips.size();
+    account.animations.left_out = gltf_.animations.size() - account.animations.used;
     std::vector<bool> drawn(gltf_.meshes.size(), false);
     for (std::size_t i = 0; i < seen_.size(); ++i) {
       const tinygltf::Node& node = gltf_.nodes[i];
@@ -75,9 +77,10 @@ class SceneReader {
       for (const tinygltf::Primitive& primitive : gltf_.meshes[i].primitives) {
         const std::string uv = gltf_uv(gltf_, primitive.material).attribute;
         for (const auto& [name, accessor] : primitive.attributes) {
-          const bool posed = name == "JOINTS_0" || name == "WEIGHTS_0";
-          const bool known =
-              name == "POSITION" || name == "NORMAL" || name == "COLOR_0" || name == uv;
+          const bool bones = name == "JOINTS_0" || name == "WEIGHTS_0";
+          const bool posed = bones && !parts_.any();
+          const bool known = name == "POSITION" || name == "NORMAL" || name == "COLOR_0" ||
+                             name == uv || (bones && parts_.any());
           ++(drawn[i] && known   ? account.attributes.used
              : drawn[i] && posed ? account.attributes.changed
                                  : account.attributes.left_out);
@@ -87,10 +90,6 @@ class SceneReader {
   }
 
   Result<void> run() {
-    GltfClips clips = gltf_clips(gltf_, roots(), label_, model_.diagnostics);
-    node_joints_ = std::move(clips.node_joints);
-    model_.joints = std::move(clips.joints);
-    model_.clips = std::move(clips.clips);
     for (const int node : roots()) MODAR_TRY(walk(node, glm::dmat4(1.0), 0));
     finish();
     return {};
@@ -135,7 +134,7 @@ class SceneReader {
     }
     const glm::dmat4 to_scene = parent * node_transform(node);
     if (node.mesh >= 0 && static_cast<std::size_t>(node.mesh) < gltf_.meshes.size()) {
-      joint_ = node_joints_[static_cast<std::size_t>(index)];
+      node_ = static_cast<std::size_t>(index);
       MODAR_TRY(add_mesh(node, to_scene));
     }
     for (const int child : node.children) MODAR_TRY(walk(child, to_scene, depth + 1));
@@ -161,7 +160,7 @@ class SceneReader {
       const tinygltf::Mesh& mesh = gltf_.meshes[static_cast<std::size_t>(node.mesh)];
       weights_ = node.weights.empty() ? mesh.weights : node.weights;
       for (const auto& primitive : mesh.primitives) {
-        MODAR_TRY(add_primitive(primitive, node.skin, to_scene * copy));
+        MODAR_TRY(add_primitive(primitive, node.skin, to_scene, copy));
       }
     }
     return {};
@@ -208,7 +207,7 @@ class SceneReader {
   }
 
   Result<void> add_primitive(const tinygltf::Primitive& primitive, int skin,
-                             const glm::dmat4& to_scene) {
+                             const glm::dmat4& to_scene, const glm::dmat4& copy) {
     const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
     if (mode < TINYGLTF_MODE_TRIANGLES) {
       ++left_out_.lines_and_points;
@@ -239,11 +238,15 @@ class SceneReader {
     if (model_.positions.size() + positions.size() >= kNoIndex) {
       return wrong("gltf.read", "it has more vertices than 32 bits count");
     }
-    const auto places = skins_.bind(primitive, skin, positions.size(), to_scene);
+    const auto places = skins_.bind(primitive, skin, positions.size(), to_scene * copy);
     if (!places) return wrong("gltf.skin", "a skin, its joints or its weights are broken");
-    skinned_ = places->skinned();
     const auto first = static_cast<std::uint32_t>(model_.positions.size());
+    const std::uint32_t group = places->skinned()
+                                    ? parts_.of_skin(static_cast<std::size_t>(skin), skins_)
+                                    : parts_.of_node(node_);
+    const bool moves = group != GltfParts::kStill;
     std::optional<glm::dmat4> place = places->of(0);
+    if (moves && place) place = stored_place(*places, group, copy);
     glm::dmat3 turn(1.0);
     const bool mirrored = place && glm::determinant(glm::dmat3(*place)) < 0;
     for (std::size_t v = 0; v < positions.size(); ++v) {
@@ -251,6 +254,7 @@ class SceneReader {
         place = places->of(v);
         if (!place)
           return wrong("gltf.skin", "a vertex refers to a joint that its skin does not have");
+        if (moves) place = stored_place(*places, group, copy);
         turn = glm::transpose(glm::inverse(glm::dmat3(*place)));
       }
       glm::dvec3 at = vector(positions, v);
@@ -262,10 +266,20 @@ class SceneReader {
                                    : glm::dvec2(0.0));
       model_.colours.push_back(has_colours ? colour_of(colours, v) : glm::vec3(1.0f));
     }
+    for (std::size_t v = 0; v < positions.size() && parts_.any(); ++v) {
+      parts_.add_vertex(moves && places->skinned() ? places->shares(v) : std::vector<BoneShare>());
+    }
     any_colours_ = any_colours_ || has_colours;
     if (has_colours && has_alpha(colours, positions.size())) ++left_out_.vertex_alphas;
     begin_material(primitive.material);
+    if (parts_.any()) parts_.begin_faces(model_.corner_positions.size() / 3, group);
     return add_triangles(primitive, mode, first, positions.size(), mirrored, has_uvs, has_normals);
+  }
+
+  /// Where the vertices of what moves are stored.
+  [[nodiscard]] glm::dmat4 stored_place(const VertexPlaces& places, std::uint32_t group,
+                                        const glm::dmat4& copy) const {
+    return places.skinned() ? parts_.group(group).to_stored : parts_.to_stored(node_) * copy;
   }
 
   static bool has_alpha(const GltfAccessor& colours, std::size_t count) {
@@ -288,22 +302,16 @@ class SceneReader {
     return {accessor.at(v, 0), accessor.at(v, 1), accessor.at(v, 2)};
   }
 
-  static void begin_run(std::vector<FaceRun>& runs, std::uint64_t face, std::uint32_t value) {
-    if (!runs.empty() && runs.back().first_face == face) {
-      runs.back().value = value;
-    } else if (runs.empty() || runs.back().value != value) {
-      runs.push_back({face, value});
-    }
-  }
-
   void begin_material(int material) {
     const bool known = material >= 0 && static_cast<std::size_t>(material) < gltf_.materials.size();
     const auto value = static_cast<std::uint32_t>(known ? static_cast<std::size_t>(material)
                                                         : gltf_.materials.size());
     const std::uint64_t face = model_.corner_positions.size() / 3;
-    begin_run(model_.material_runs, face, value);
-    // Vertices of skins move with joints of their own: their faces keep the pose of the file.
-    if (!model_.clips.empty()) begin_run(model_.joint_runs, face, skinned_ ? kNoJoint : joint_);
+    if (!model_.material_runs.empty() && model_.material_runs.back().first_face == face) {
+      model_.material_runs.back().value = value;
+    } else if (model_.material_runs.empty() || model_.material_runs.back().value != value) {
+      model_.material_runs.push_back({face, value});
+    }
   }
 
   Result<void> add_triangles(const tinygltf::Primitive& primitive, int mode, std::uint32_t first,
@@ -350,9 +358,10 @@ class SceneReader {
   }
 
   void finish() {
+    if (!any_colours_) model_.colours.release();
+    parts_.cut(model_);
     compact(model_.corner_positions, model_.corner_uvs);
     compact(model_.corner_positions, model_.corner_normals);
-    if (!any_colours_) model_.colours.release();
     // The specification: faces without normals are flat-shaded.
     model_.smoothing_runs = {{0, 0}};
   }
@@ -362,9 +371,8 @@ class SceneReader {
   std::string label_;
   SkinPoses skins_;
   std::vector<bool> seen_;  // nodes: glTF's are trees
-  std::vector<std::uint32_t> node_joints_;
-  std::uint32_t joint_ = kNoJoint;  // of the node at hand
-  bool skinned_ = false;            // the primitive at hand
+  GltfParts parts_;
+  std::size_t node_ = 0;  // at hand
   bool any_colours_ = false;
   std::vector<double> weights_;  // of the mesh at hand's morph targets
   LeftOut left_out_;
@@ -421,14 +429,15 @@ Result<void> require_support(const tinygltf::Model& gltf, std::string_view bytes
 }
 
 /// What of the file no bundle holds, as one finding.
-void report_left_out(const tinygltf::Model& gltf, const LeftOut& counts, const std::string& label,
-                     std::vector<Diagnostic>& diagnostics) {
+/// animations: that no clip of the model is of.
+void report_left_out(const tinygltf::Model& gltf, std::size_t animations, const LeftOut& counts,
+                     const std::string& label, std::vector<Diagnostic>& diagnostics) {
   std::string words;
   const auto add = [&words](std::size_t count, const char* one, const char* many) {
     if (count == 0) return;
     words += (words.empty() ? "" : ", ") + std::to_string(count) + " " + (count == 1 ? one : many);
   };
-  add(gltf.animations.size(), "animation (the pose of the file's nodes is baked)",
+  add(animations, "animation (the pose of the file's nodes is baked)",
       "animations (the pose of the file's nodes is baked)");
   add(counts.morphs, "set of morph targets (at its default weights)",
       "sets of morph targets (at their default weights)");
@@ -443,12 +452,11 @@ void report_left_out(const tinygltf::Model& gltf, const LeftOut& counts, const s
   }
   if (!extensions.empty()) words += (words.empty() ? "" : ", ") + ("extensions " + extensions);
   if (words.empty()) return;
-  const bool shows = !gltf.animations.empty() || counts.morphs + counts.lines_and_points != 0;
+  const bool shows = animations != 0 || counts.morphs + counts.lines_and_points != 0;
   diagnostics.push_back(
       {"gltf.left-out", shows ? DiagnosticSeverity::kWarning : DiagnosticSeverity::kInfo, label, 0,
        "left out: " + words,
-       gltf.animations.empty() ? ""
-                               : "for another pose, apply it to the model and export it again"});
+       animations == 0 ? "" : "for another pose, apply it to the model and export it again"});
 }
 
 // How tinygltf reads the files that a model names: regular ones, under the names as they stand.
@@ -568,10 +576,11 @@ Result<SourceModel> read_gltf(const std::string& path, const ReadOptions& option
   std::vector<MetalMap> metal_maps;
   model.materials =
       gltf_materials(gltf, place, path, model.diagnostics, metal_maps, model.account.images);
-  SceneReader scene(gltf, model, path);
+  SceneReader scene(gltf, model, path, options.clips);
   MODAR_TRY(scene.run());
   apply_metal_maps(metal_maps, path, model);
-  report_left_out(gltf, scene.left_out(), path, model.diagnostics);
+  const std::size_t still = model.movement.clips.empty() ? gltf.animations.size() : 0;
+  report_left_out(gltf, still, scene.left_out(), path, model.diagnostics);
   scene.account();
   if (model.corner_positions.empty()) {
     return fail(ExitCode::kInvalidInput, "gltf.no-faces", path, "it contains no triangles",

@@ -265,7 +265,13 @@ class Fit {
     while (from + 1 < samples_) {
       const glm::dvec4 a = decoded(track, record, keys.back());
       std::uint32_t to = from + 1;
-      while (to + 1 < samples_ && holds(from, a, to + 1)) ++to;
+      std::uint32_t step = 1;
+      // Twice as far while it holds, then half as far.
+      for (bool farther = true; step > 0; step = farther ? 2 * step : step / 2) {
+        const bool good = to + step < samples_ && holds(from, a, to + step);
+        if (good) to += step;
+        if (!good && farther) farther = false;
+      }
       keys.push_back(key_at(to));
       from = to;
     }

@@ -99,6 +99,7 @@ TriMesh mesh_of(const TriMesh& source, const MaterialCorners& corners,
         take_over(source.normals, v, mesh.normals);
         take_over(source.uvs, v, mesh.uvs);
         take_over(source.colours, v, mesh.colours);
+        take_over(source.vertex_bones, v, mesh.vertex_bones);
       }
       triangle[k] = places[v];
     }

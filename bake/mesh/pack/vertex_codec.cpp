@@ -260,6 +260,13 @@ LayoutRecord make_layout(const TriMesh& mesh, PositionKind kind, VertexOffsets& 
     add(Semantic::kColour, ComponentType::kU8, 4, true, offsets.colour);
     offsets.stride = static_cast<std::uint16_t>(offsets.stride + 4);
   }
+  if (!mesh.vertex_bones.empty()) {
+    offsets.bones = offsets.stride;
+    add(Semantic::kJoints, ComponentType::kU8, 4, false, offsets.bones);
+    add(Semantic::kWeights, ComponentType::kU8, 4, true,
+        static_cast<std::uint16_t>(offsets.bones + 4));
+    offsets.stride = static_cast<std::uint16_t>(offsets.stride + 8);
+  }
   layout.stride = offsets.stride;
   return layout;
 }
@@ -331,6 +338,10 @@ void VertexPacker::pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange
     if (offsets_.uv != 0) put_uv(mesh_.uvs[v], uv, texture_side, bytes + offsets_.uv);
     if (offsets_.occlusion != 0) bytes[offsets_.occlusion] = std::byte{mesh_.occlusion[v]};
     if (offsets_.colour != 0) std::memcpy(bytes + offsets_.colour, &mesh_.colours[v], 4);
+    if (offsets_.bones != 0) {
+      std::memcpy(bytes + offsets_.bones, mesh_.vertex_bones[v].bones.data(), 4);
+      std::memcpy(bytes + offsets_.bones + 4, mesh_.vertex_bones[v].bytes().data(), 4);
+    }
   }
 }
 

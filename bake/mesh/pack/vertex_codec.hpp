@@ -69,13 +69,14 @@ struct VertexOffsets {
   std::uint16_t uv = 0;
   std::uint16_t colour = 0;
   std::uint16_t occlusion = 0;
+  std::uint16_t bones = 0;  ///< weights follow
   std::uint16_t stride = 0;
 };
 
 /// Half floats: 3 halves, 2 bytes of padding, 3 x i8 normal, 1 of occlusion (or padding). 16-bit
 /// integers: the same, or without occlusion 3 of them and an octahedral normal of 2 x i8. Floats: 3
 /// of them, 3 x i8 normal, 1 of occlusion (or padding). Then, where the mesh has them, uv as 2 x
-/// u16 and colour as 4 x u8.
+/// u16, colour as 4 x u8, bones of a part and weights as 4 x u8 each.
 LayoutRecord make_layout(const TriMesh& mesh, PositionKind kind, VertexOffsets& offsets);
 
 /// uv = shift + offset + scale * attribute; shift holds whole numbers, which are not stored.

@@ -449,6 +449,7 @@ class NormalMaker {
     source_.positions.push_back(source_.positions[p]);
     if (own_uvs) source_.uvs.push_back(source_.uvs[p]);
     if (!source_.colours.empty()) source_.colours.push_back(source_.colours[p]);
+    if (!source_.vertex_bones.empty()) source_.vertex_bones.push_back(source_.vertex_bones[p]);
   }
 
   SourceModel& source_;

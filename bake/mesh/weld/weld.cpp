@@ -158,6 +158,9 @@ class Welder {
         mesh_.colours[v] = byte_colour(source_.colours[keys[v].position]);
       }
     }
+    for (std::size_t v = 0; v < count && !source_.vertex_bones.empty(); ++v) {
+      mesh_.vertex_bones.push_back(source_.vertex_bones[keys[v].position]);
+    }
     mesh_.positions.resize(count);
     for (std::size_t v = 0; v < count; ++v) {
       mesh_.positions[v] = source_.positions[keys[v].position];
@@ -329,6 +332,7 @@ void drop_unused(SourceModel& source, const Array<std::uint8_t>& used,
   keep_elements(source.normals, used);
   keep_elements(source.uvs, used);
   keep_elements(source.colours, used);
+  keep_elements(source.vertex_bones, used);
 }
 
 void weld_identity_indices(SourceModel& source, TriMesh& mesh, WeldCounts& counts, unsigned jobs) {
@@ -353,6 +357,7 @@ void weld_identity_indices(SourceModel& source, TriMesh& mesh, WeldCounts& count
     mesh.colours[v] = byte_colour(source.colours[v]);
   }
   source.colours.release();
+  mesh.vertex_bones = std::move(source.vertex_bones);
   mesh.positions = std::move(source.positions);
 }
 

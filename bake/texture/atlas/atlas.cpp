@@ -341,6 +341,7 @@ void move_uvs(const Plan& plan, TriMesh& mesh) {
         twice(mesh.source_positions, old);
         twice(mesh.normals, old);
         twice(mesh.colours, old);
+        twice(mesh.vertex_bones, old);
         mesh.uvs.push_back(before[old]);
         mesh.picture_uvs.push_back(pictures[old]);
       } else if (!unseen) {
@@ -357,7 +358,7 @@ bool differ_in_picture_only(const SourceMaterial& a, const SourceMaterial& b) {
   return a.ambient == b.ambient && a.diffuse == b.diffuse && a.specular == b.specular &&
          a.emission == b.emission && a.shininess == b.shininess && a.reflectance == b.reflectance &&
          a.metalness == b.metalness && a.opacity == b.opacity && a.two_sided == b.two_sided &&
-         a.occluder() == b.occluder();
+         a.occluder() == b.occluder() && a.part == b.part;
 }
 
 /// The materials once the parts are on pages, and those of the triangles.
