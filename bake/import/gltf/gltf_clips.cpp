@@ -30,8 +30,8 @@ bool read_times(const tinygltf::Model& gltf, int index, std::vector<double>& tim
     return false;
   for (std::size_t i = 0; i < accessor.size(); ++i) {
     const double time = accessor.at(i, 0);
-    // NaN is in no order.
-    if (!(time >= 0 && time < 1e6) || (i > 0 && !(time > times.back()))) return false;
+    // NaN is in no order. Of two at one time the first ends what is before, the second begins.
+    if (!(time >= 0 && time < 1e6) || (i > 0 && !(time >= times.back()))) return false;
     times.push_back(time);
   }
   return true;
@@ -81,7 +81,7 @@ Reason read_channel(const tinygltf::Model& gltf, const tinygltf::Animation& anim
   const auto& sampler = animation.samplers[static_cast<std::size_t>(channel.sampler)];
   if (sampler.interpolation == "STEP") track.interpolation = Interpolation::kStep;
   if (sampler.interpolation == "CUBICSPLINE") track.interpolation = Interpolation::kCubic;
-  if (!read_times(gltf, sampler.input, track.times)) return "times that do not rise";
+  if (!read_times(gltf, sampler.input, track.times)) return "keys whose times fall";
   if (!read_values(gltf, sampler.output, track)) return "values that are missing or no numbers";
   return {};
 }
@@ -229,8 +229,8 @@ GltfClips gltf_clips(const tinygltf::Model& gltf, const std::vector<int>& roots,
     if (read.left_out.empty()) continue;
     const std::string name = "animation '" + name_of(gltf.animations[i], i) + "' ";
     if (read.read == 0) {
-      warn(name + "is left out, and the pose of the file kept: it moves " + read.left_out,
-           "move nodes or bones instead, and export it again");
+      warn(name + "is left out, and the pose of the file kept: it has " + read.left_out,
+           "animate nodes or bones, check the file with the glTF validator and export it again");
     } else {
       warn(name + "is kept without " + read.left_out + ", whose values in the file stay",
            "check the file with the glTF validator and export it again");

@@ -73,7 +73,7 @@ class Fit {
  public:
   Fit(std::span<const SourceJoint> joints, const SourceClip& clip,
       std::span<const JointPoints> points)
-      : joints_(joints), points_(points), samples_(clip_samples(clip.duration)) {
+      : joints_(joints), points_(points), samples_(clip_samples(clip)) {
     for (std::uint32_t i = 0; i < samples_; ++i) {
       poses_.push_back(clip_pose(joints, clip, clip.duration * i / (samples_ - 1)));
     }
@@ -103,7 +103,8 @@ class Fit {
     write(kept, fitted);
     ClipTracksView view;
     view_clip_tracks(fitted.bytes, static_cast<std::uint32_t>(joints_.size()), view);
-    fitted.error = greatest([&](std::uint32_t i) { return tracks_pose(joints_, view, i); });
+    std::vector<std::uint32_t> keys;
+    fitted.error = greatest([&](std::uint32_t i) { return tracks_pose(joints_, view, i, keys); });
     return fitted;
   }
 
@@ -310,11 +311,31 @@ class Fit {
   std::vector<DenseTrack> tracks_;
 };
 
+/// Whether all keys are at multiples of a part of the duration.
+bool on_grid(const SourceClip& clip, double parts) {
+  constexpr double kOff = 0.02;  // of a part: exporters round times to floats
+  const double part = clip.duration / parts;
+  return std::all_of(clip.tracks.begin(), clip.tracks.end(), [part](const SourceTrack& track) {
+    return std::all_of(track.times.begin(), track.times.end(), [part](double time) {
+      return std::abs(time / part - std::round(time / part)) <= kOff;
+    });
+  });
+}
+
 }  // namespace
 
-std::uint32_t clip_samples(double duration) {
-  const double count = std::ceil(duration * kClipRate) + 1;
-  return static_cast<std::uint32_t>(std::clamp(count, 2.0, static_cast<double>(kMaxClipSamples)));
+std::uint32_t clip_samples(const SourceClip& clip) {
+  constexpr double kMost = kMaxClipSamples - 1;
+  const double least = std::clamp(std::ceil(clip.duration * kClipRate), 1.0, kMost);
+  for (const SourceTrack& track : clip.tracks) {
+    const double span = track.times.back() - track.times.front();
+    if (!(span > 0)) continue;
+    const auto gaps = static_cast<double>(track.times.size() - 1);
+    const double parts = std::round(gaps * clip.duration / span);
+    const double samples = parts * std::ceil(least / parts);
+    if (samples <= kMost && on_grid(clip, parts)) return static_cast<std::uint32_t>(samples) + 1;
+  }
+  return static_cast<std::uint32_t>(least) + 1;
 }
 
 std::vector<glm::dmat4> clip_pose(std::span<const SourceJoint> joints, const SourceClip& clip,
@@ -327,12 +348,13 @@ std::vector<glm::dmat4> clip_pose(std::span<const SourceJoint> joints, const Sou
 }
 
 std::vector<glm::dmat4> tracks_pose(std::span<const SourceJoint> joints, const ClipTracksView& view,
-                                    double sample) {
+                                    double sample, std::vector<std::uint32_t>& keys) {
   std::vector<JointPlace> places = rest_places(joints);
-  for (const TrackRecord& track : view.tracks) {
-    std::uint32_t key = 0;
+  keys.resize(view.tracks.size());
+  for (std::size_t t = 0; t < keys.size(); ++t) {
+    const TrackRecord& track = view.tracks[t];
     place_value(places[track.joint], static_cast<TrackPath>(track.path),
-                read_value(view.at(track, static_cast<float>(sample), key)));
+                read_value(view.at(track, static_cast<float>(sample), keys[t])));
   }
   return composed(joints, places);
 }

@@ -29,12 +29,13 @@ struct FittedClip {
 /// Joints' places in the scene at a time of the clip.
 std::vector<glm::dmat4> clip_pose(std::span<const SourceJoint> joints, const SourceClip& clip,
                                   double time);
-/// The same of the tracks' bytes, at a sample.
+/// The same of the tracks' bytes, at a sample. keys: of each track, for the next call.
 std::vector<glm::dmat4> tracks_pose(std::span<const SourceJoint> joints, const ClipTracksView& view,
-                                    double sample);
+                                    double sample, std::vector<std::uint32_t>& keys);
 
-/// At least two, no more than 1/kClipRate seconds apart, over the whole duration.
-std::uint32_t clip_samples(double duration);
+/// At least two, no more than 1/kClipRate seconds apart, over the whole duration; on the keys of
+/// the clip where these are equally far apart.
+std::uint32_t clip_samples(const SourceClip& clip);
 
 /// bound: scene units, greatest distance at any sample. Deterministic.
 FittedClip fit_clip(std::span<const SourceJoint> joints, const SourceClip& clip,

@@ -120,11 +120,12 @@ class Measure {
     std::vector<double> errors(kStretches, 0);
     std::vector<std::vector<PartBox>> boxes(kStretches, std::vector<PartBox>(boxes_.size(), kNowhere));
     parallel_rows(kStretches, jobs_, [&](std::uint32_t s) {
+      std::vector<std::uint32_t> keys;
       const auto end = static_cast<std::uint32_t>(std::uint64_t{samples} * (s + 1) / kStretches);
       for (auto i = static_cast<std::uint32_t>(std::uint64_t{samples} * s / kStretches); i < end;
            ++i) {
         const auto source = clip_pose(joints(), clip, clip.duration * i / (samples - 1));
-        const auto stored = tracks_pose(joints(), view, i);
+        const auto stored = tracks_pose(joints(), view, i, keys);
         errors[s] = std::max(errors[s], compare(source, stored, boxes[s]));
       }
     });
@@ -214,7 +215,7 @@ FittedMovement fit_movement(const SourceModel& model, double bound, unsigned job
   double error = 0;
   for (const SourceClip& clip : model.movement.clips) {
     const bool long_clip = clip.duration > static_cast<double>(kMostClipSeconds) ||
-                           clip_samples(clip.duration) * measure.joints().size() > kMostPoses;
+                           clip_samples(clip) * measure.joints().size() > kMostPoses;
     if (long_clip || result.clips.size() == kMostClips) {
       diagnostics.push_back({"model.clip", DiagnosticSeverity::kWarning, model.name, 0,
                              "the clip '" + clip.name + "' is left out: " +

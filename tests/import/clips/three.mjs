@@ -1,4 +1,4 @@
-// Prints where three.js (npm, 0.160) has the vertices of a glTF file at 20 times of its first clip:
+// Prints where three.js (npm) has the vertices of a glTF file at 20 times of its first clip:
 //   node three.mjs moving.gltf > moving.txt
 import fs from 'node:fs';
 import * as THREE from 'three';
@@ -17,8 +17,9 @@ for (let step = 0; step < 20; ++step) {
     if (!node.isMesh) return;
     const places = node.geometry.attributes.position;
     for (let i = 0; i < places.count; ++i) {
-      const at = new THREE.Vector3().fromBufferAttribute(places, i).applyMatrix4(node.matrixWorld);
-      console.log(at.x, at.y, at.z);
+      const at = new THREE.Vector3();
+      node.getVertexPosition(i, at).applyMatrix4(node.matrixWorld);
+      console.log(at.toArray().map((part) => part.toFixed(6)).join(' '));
     }
   });
 }
