@@ -9,8 +9,10 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -141,6 +143,75 @@ TEST(Clips, MovementStatesItsErrorAndBoxes) {
     };
     EXPECT_TRUE(std::any_of(fitted.boxes.begin(), fitted.boxes.end(), inside));
   }
+}
+
+/// A file with a part of its text replaced, as it is read.
+Result<SourceModel> changed_model(const std::string& name,
+                                  const std::vector<std::pair<std::string, std::string>>& changes) {
+  std::ifstream file(clip_file(name));
+  std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  for (const auto& [from, to] : changes) {
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    if (at != std::string::npos) text.replace(at, from.size(), to);
+  }
+  const std::string path = testing::TempDir() + "changed.gltf";
+  std::ofstream(path) << text;
+  return read_gltf(path);
+}
+
+bool says(const SourceModel& model, const std::string& words) {
+  return std::any_of(
+      model.diagnostics.begin(), model.diagnostics.end(),
+      [&](const Diagnostic& each) { return each.message.find(words) != std::string::npos; });
+}
+
+TEST(Clips, MissingInverseBindMatricesAreIdentities) {
+  const auto model = changed_model("skinned.gltf", {{", \"inverseBindMatrices\": 5", ""}});
+  ASSERT_TRUE(model) << to_line(model.error());
+  ASSERT_EQ(model->movement.clips.size(), 1U);
+  // Without them a vertex at the first joint's place is moved on by the joints of its chain.
+  const auto pose = clip_pose(model->movement.joints, {}, 0);
+  EXPECT_GT(posed(*model, pose, 79, 1).y, posed(model_of("skinned.gltf"), pose, 79, 1).y + 1);
+}
+
+TEST(Clips, WhatIsMalformedIsAFinding) {
+  struct Case {
+    std::vector<std::pair<std::string, std::string>> changes;
+    std::string words;
+  };
+  const Case cases[] = {
+      {{{"\"path\": \"rotation\"", "\"path\": \"pointer\""}}, "KHR_animation_pointer"},
+      {{{"\"path\": \"rotation\"", "\"path\": \"weights\""}}, "weights of morph targets"},
+      {{{"\"target\": {\"node\": 2,", "\"target\": {\"node\": 999,"}}, "a target that does not exist"},
+      {{{"\"sampler\": 0", "\"sampler\": 99"}}, "a sampler that does not exist"},
+      {{{"\"input\": 6", "\"input\": 4"}}, "keys whose times fall"},
+      {{{"\"output\": 7", "\"output\": 0"}}, "values that are missing"},
+  };
+  for (const Case& each : cases) {
+    const auto model = changed_model("skinned.gltf", each.changes);
+    ASSERT_TRUE(model) << each.words;
+    EXPECT_TRUE(says(*model, each.words)) << each.words;
+    EXPECT_EQ(model->movement.clips.size(), 1U) << "the other channels stay";
+  }
+}
+
+TEST(Clips, BrokenSkinsAreErrors) {
+  for (const auto& [from, to] : {std::pair<std::string, std::string>{"\"joints\": [2, ", "\"joints\": [999, "},
+                                 {"\"JOINTS_0\": 2", "\"JOINTS_0\": 4"},
+                                 {"\"children\": [3]", "\"children\": [0]"}}) {
+    EXPECT_FALSE(changed_model("skinned.gltf", {{from, to}})) << from;
+  }
+}
+
+TEST(Clips, ClipsCanBeLeftOut) {
+  ReadOptions options;
+  options.clips = false;
+  const auto model = read_gltf(clip_file("skinned.gltf"), options);
+  ASSERT_TRUE(model);
+  EXPECT_TRUE(model->movement.parts.empty());
+  EXPECT_TRUE(model->vertex_bones.empty());
+  EXPECT_TRUE(says(*model, "the pose of the file's nodes is baked"));
 }
 
 TEST(Clips, WeightsAreBytesWhoseSumIs255) {

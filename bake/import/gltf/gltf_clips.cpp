@@ -148,7 +148,6 @@ class JointFinder {
       if (moved_[n]) {
         joint_of_[n] = static_cast<std::uint32_t>(clips_.joints.size());
         clips_.joints.push_back({step.joint, step.before, rest_of(node)});
-        clips_.stored.push_back(stored_place(clips_.joints.back()));
         step = {step.node, joint_of_[n], glm::dmat4(1.0)};
       } else {
         step.before = step.before * node_transform(node);
@@ -164,18 +163,35 @@ class JointFinder {
   }
 
  private:
-  [[nodiscard]] glm::dmat4 stored_place(const SourceJoint& joint) const {
-    JointPlace place = joint.rest;
-    for (int i = 0; i < 3; ++i) place.scale[i] = place.scale[i] == 0 ? 1 : place.scale[i];
-    const glm::dmat4 own = joint.before * place.matrix();
-    return joint.parent == kNoJoint ? own : clips_.stored[joint.parent] * own;
-  }
-
   const tinygltf::Model& gltf_;
   const std::vector<bool>& moved_;
   GltfClips& clips_;
   std::vector<std::uint32_t> joint_of_;
 };
+
+/// See GltfClips::stored.
+std::vector<glm::dmat4> stored_places(const GltfClips& clips) {
+  std::vector<JointPlace> places;
+  for (const SourceJoint& joint : clips.joints) places.push_back(joint.rest);
+  for (const SourceTrack& track : clips.clips.empty() ? std::vector<SourceTrack>()
+                                                      : clips.clips.front().tracks) {
+    const glm::dvec4 value = track.at(0);
+    JointPlace& place = places[track.joint];
+    if (track.path == TrackPath::kTranslation) place.translation = glm::dvec3(value);
+    if (track.path == TrackPath::kRotation) place.rotation = value;
+    if (track.path == TrackPath::kScale) place.scale = glm::dvec3(value);
+  }
+  std::vector<glm::dmat4> result;
+  for (std::size_t j = 0; j < places.size(); ++j) {
+    for (int i = 0; i < 3; ++i) {
+      places[j].scale[i] = places[j].scale[i] == 0 ? 1 : places[j].scale[i];
+    }
+    const glm::dmat4 own = clips.joints[j].before * places[j].matrix();
+    const std::uint32_t parent = clips.joints[j].parent;
+    result.push_back(parent == kNoJoint ? own : result[parent] * own);
+  }
+  return result;
+}
 
 struct ReadChannel {
   int node;
@@ -264,6 +280,7 @@ GltfClips gltf_clips(const tinygltf::Model& gltf, const std::vector<int>& roots,
     clip.tracks.erase(std::unique(clip.tracks.begin(), clip.tracks.end(), same), clip.tracks.end());
     if (!clip.tracks.empty()) result.clips.push_back(std::move(clip));
   }
+  result.stored = stored_places(result);
   return result;
 }
 

@@ -21,8 +21,8 @@ struct GltfClips {
   std::vector<SourceClip> clips;           ///< each has a track
   std::vector<std::uint32_t> node_joints;  ///< of each node: that it moves with, or kNoJoint
   std::vector<glm::dmat4> node_places;     ///< of each node: to the space of that, or the scene's
-  /// Where each joint is in the scene while its vertices are stored: its rest place, where scales
-  /// of 0, which flatten what they hide, are 1.
+  /// Where each joint is in the scene while its vertices are stored: where the first clip begins,
+  /// as rest poses may be elsewhere. Scales of 0, which flatten what they hide, are 1.
   std::vector<glm::dmat4> stored;
 };
 
