@@ -203,8 +203,8 @@ bool own_picture(const ModelRequest& model, const BakeRequest& request) {
                       });
 }
 
-/// Of the box's largest side: what half floats may move a vertex by, too.
-constexpr double kClipBound = 0x1p-12;
+/// Of the largest side: twice what half floats may move a vertex by. Less takes more keys.
+constexpr double kClipBound = 0x1p-11;
 
 /// The greatest distance that a model's clips may be off, source units.
 double clip_bound(const SourceModel& source, const BakeRequest& request) {
