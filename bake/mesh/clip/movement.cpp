@@ -50,6 +50,30 @@ std::vector<std::vector<std::uint32_t>> vertices_of(const SourceModel& model) {
   return result;
 }
 
+/// A vertex with what moves it: the shares of the source, and those that are stored.
+struct MovedVertex {
+  glm::dvec4 at{0.0};
+  int count = 0;
+  std::array<std::uint8_t, 4> bones{};
+  std::array<double, 4> wanted{};
+  std::array<double, 4> stored{};
+};
+
+MovedVertex moved_vertex(const SourceModel& model, std::uint32_t v) {
+  const VertexBones shares = model.vertex_bones.empty() ? VertexBones() : model.vertex_bones[v];
+  const auto bytes = shares.bytes();
+  MovedVertex vertex;
+  vertex.at = glm::dvec4(model.positions[v], 1.0);
+  for (std::size_t k = 0; k < 4; ++k) {
+    if (shares.weights[k] <= 0 && bytes[k] == 0) continue;
+    const auto n = static_cast<std::size_t>(vertex.count++);
+    vertex.bones[n] = shares.bones[k];
+    vertex.wanted[n] = static_cast<double>(shares.weights[k]);
+    vertex.stored[n] = bytes[k] / 255.0;
+  }
+  return vertex;
+}
+
 /// Of many points those that are furthest in some direction.
 class Extremes {
  public:
@@ -82,9 +106,13 @@ class Measure {
  public:
   Measure(const SourceModel& model, unsigned jobs)
       : model_(model), jobs_(jobs), vertices_(vertices_of(model)) {
-    for (std::size_t p = 0; p < vertices_.size(); ++p) {
+    for (const std::vector<std::uint32_t>& part : vertices_) {
       PartBox& box = boxes_.emplace_back(kNowhere);
-      for (const std::uint32_t v : vertices_[p]) extend(box, model.positions[v]);
+      std::vector<MovedVertex>& moved = moved_.emplace_back();
+      for (const std::uint32_t v : part) {
+        extend(box, model.positions[v]);
+        moved.push_back(moved_vertex(model, v));
+      }
     }
     pose(clip_pose(joints(), {}, 0), boxes_);
   }
@@ -171,17 +199,12 @@ class Measure {
     for (std::size_t p = 0; p < vertices_.size(); ++p) {
       const std::vector<glm::dmat4> exact = bone_matrices(source, p);
       const std::vector<glm::dmat4> kept = bone_matrices(stored, p);
-      for (const std::uint32_t v : vertices_[p]) {
-        const VertexBones shares = bones_of(v);
-        const auto bytes = shares.bytes();
-        const glm::dvec4 at(model_.positions[v], 1.0);
+      for (const MovedVertex& vertex : moved_[p]) {
         glm::dvec3 wanted(0.0);
         glm::dvec3 found(0.0);
-        for (std::size_t k = 0; k < 4; ++k) {
-          if (shares.weights[k] <= 0 && bytes[k] == 0) continue;
-          const std::uint8_t b = shares.bones[k];
-          wanted += static_cast<double>(shares.weights[k]) * glm::dvec3(exact[b] * at);
-          found += bytes[k] / 255.0 * glm::dvec3(kept[b] * at);
+        for (std::size_t k = 0; k < static_cast<std::size_t>(vertex.count); ++k) {
+          wanted += vertex.wanted[k] * glm::dvec3(exact[vertex.bones[k]] * vertex.at);
+          found += vertex.stored[k] * glm::dvec3(kept[vertex.bones[k]] * vertex.at);
         }
         extend(boxes[p], found);
         const glm::dvec3 apart = found - wanted;
@@ -194,6 +217,7 @@ class Measure {
   const SourceModel& model_;
   unsigned jobs_;
   std::vector<std::vector<std::uint32_t>> vertices_;  // of each part
+  std::vector<std::vector<MovedVertex>> moved_;       // the same
   std::vector<PartBox> boxes_;
 };
 
