@@ -155,7 +155,7 @@ Result<SourceModel> changed_model(const std::string& name,
     EXPECT_NE(at, std::string::npos) << from;
     if (at != std::string::npos) text.replace(at, from.size(), to);
   }
-  const std::string path = testing::TempDir() + "changed.gltf";
+  const std::string path = ::testing::TempDir() + "changed.gltf";
   std::ofstream(path) << text;
   return read_gltf(path);
 }

@@ -1,5 +1,7 @@
 #include "bake/bundle/scene/scene_placement.hpp"
 
+#include "bake/bundle/scene/model_pose.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -76,11 +78,12 @@ bool keeps_boxes(const glm::dmat3& turn) {
   return true;
 }
 
-/// Of the vertices of a model's finest level. Chunks, Levels: of a bundle that is written or read.
+/// Of the vertices of a model's finest level, in a pose. Chunks, Levels: of a bundle that is written or read.
 template <class Chunks, class Levels>
 TurnedBox box_of_vertices(const ModelRecord& model, const LayoutRecord& layout,
                           const Chunks& chunks, const Levels& levels,
-                          std::span<const std::byte> bytes, const glm::dmat3& turn) {
+                          std::span<const std::byte> bytes, const ModelPose& pose,
+                          const glm::dmat3& turn) {
   TurnedBox box;
   const VertexDecoder decoder(layout);
   for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
@@ -89,7 +92,7 @@ TurnedBox box_of_vertices(const ModelRecord& model, const LayoutRecord& layout,
     for (std::uint32_t v = 0; v < level.vertex_count; ++v) {
       const std::byte* vertex =
           bytes.data() + level.vertex_offset + std::size_t{v} * decoder.stride();
-      box.add(turn * decoder.position(vertex, chunk));
+      box.add(turn * pose.place(layout, decoder, chunk, vertex));
     }
   }
   return box;
@@ -101,7 +104,7 @@ TurnedBox turned_box(const BundleContent& content, const PlacedModel& model,
   TurnedBox box;
   if (!(largest > 0)) {
     box.add(glm::dvec3(0.0));
-  } else if (keeps_boxes(turn)) {
+  } else if (keeps_boxes(turn) && first_clip(content, model.index) == kNone) {
     const glm::dvec3 half(model.sides[0] / largest, model.sides[1] / largest,
                           model.sides[2] / largest);
     glm::dvec3 turned(0.0);
@@ -114,7 +117,7 @@ TurnedBox turned_box(const BundleContent& content, const PlacedModel& model,
   } else {
     const ModelRecord& record = content.models[model.index];
     box = box_of_vertices(record, content.layouts[record.layout], content.chunks, content.levels,
-                          content.vertices, turn);
+                          content.vertices, first_pose(content, model.index), turn);
   }
   return box;
 }
@@ -236,7 +239,7 @@ double scene_height_mm(const BundleView& bundle, const SceneRecord& scene) {
                             scene.rotation[2]);
   const TurnedBox box =
       box_of_vertices(model, bundle.layouts()[model.layout], bundle.chunks(), bundle.levels(),
-                      bundle.vertices(), glm::mat3_cast(rotation));
+                      bundle.vertices(), first_pose(bundle, scene.model), glm::mat3_cast(rotation));
   return static_cast<double>(scene.scale) * (box.greatest.z - box.least.z) *
          millimetres_in_unit(bundle.patterns()[scene.pattern]);
 }

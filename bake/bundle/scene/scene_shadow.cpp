@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 #include <glm/mat4x4.hpp>
 
+#include "bake/bundle/scene/model_pose.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/mesh/rays/triangle_tree.hpp"
 #include "bake/texture/texture_codec.hpp"
@@ -80,8 +81,8 @@ AlphaMask alpha_mask(const BundleContent& content, std::uint32_t texture) {
 /// The models on the plane: corners of triangles, three after three, and what they let through.
 class Casters {
  public:
-  Casters(const BundleContent& content, const SceneRecord& scene) {
-    place(content, scene);
+  Casters(const BundleContent& content, const SceneRecord& scene, const ModelPose& pose) {
+    place(content, scene, pose);
     masks_.resize(content.materials.size());
     for (const MaterialRecord& material : content.materials) {
       opacities_.push_back(static_cast<double>(material.opacity));
@@ -121,7 +122,7 @@ class Casters {
     return opacities_[material] * mask.at(uv);
   }
 
-  void place(const BundleContent& content, const SceneRecord& scene);
+  void place(const BundleContent& content, const SceneRecord& scene, const ModelPose& pose);
 
   std::vector<glm::dvec3> corners_;
   std::vector<glm::dvec2> uvs_;           ///< of each corner
@@ -131,7 +132,8 @@ class Casters {
   std::optional<RayTree> tree_;
 };
 
-void Casters::place(const BundleContent& content, const SceneRecord& scene) {
+void Casters::place(const BundleContent& content, const SceneRecord& scene,
+                    const ModelPose& pose) {
   const ModelRecord& model = content.models[scene.model];
   const auto count_at = [&](std::uint32_t depth) {
     std::size_t count = 0;
@@ -142,7 +144,8 @@ void Casters::place(const BundleContent& content, const SceneRecord& scene) {
   };
   std::uint32_t depth = 0;
   while (depth + 1 < model.level_count && count_at(depth) > kMostTriangles) ++depth;
-  const VertexDecoder decoder(content.layouts[model.layout]);
+  const LayoutRecord& layout = content.layouts[model.layout];
+  const VertexDecoder decoder(layout);
   const bool textured = decoder.has(Semantic::kUv);
   const glm::dmat4 to_pattern(scene_matrix(scene));
   for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
@@ -155,7 +158,8 @@ void Casters::place(const BundleContent& content, const SceneRecord& scene) {
       std::memcpy(&index, content.indices.data() + level.index_offset + 2 * std::uint64_t{i}, 2);
       const std::byte* vertex =
           content.vertices.data() + level.vertex_offset + std::uint64_t{index} * decoder.stride();
-      corners_.emplace_back(to_pattern * glm::dvec4(decoder.position(vertex, chunk), 1.0));
+      corners_.emplace_back(to_pattern *
+                            glm::dvec4(pose.place(layout, decoder, chunk, vertex), 1.0));
       uvs_.push_back(textured ? decoder.uv(vertex, chunk) : glm::dvec2(0.0));
       if (i % 3 == 0) materials_.push_back(chunk.material);
     }
@@ -254,19 +258,36 @@ double faded(double left, double u, double v) {
   return glm::mix(1.0, left, std::clamp(rim - 0.5 / 8, 0.0, 1.0));
 }
 
+/// The scene's model, through the clip that it plays.
+std::vector<Casters> poses_of(const BundleContent& content, std::uint32_t scene) {
+  constexpr int kPoses = 8;
+  std::uint32_t clip = kNone;
+  for (const SceneClipRecord& plays : content.scene_clips) {
+    if (plays.scene == scene) clip = plays.clip;
+  }
+  const SceneRecord& record = content.scenes[scene];
+  std::vector<Casters> poses;
+  if (clip == kNone) poses.emplace_back(content, record, first_pose(content, record.model));
+  for (int i = 0; i < kPoses && clip != kNone; ++i) {
+    poses.emplace_back(content, record, pose_at(content, clip, (i + 0.5) / kPoses));
+  }
+  return poses;
+}
+
 }  // namespace
 
 std::vector<std::byte> scene_shadow(const BundleContent& content, std::uint32_t scene,
                                     unsigned jobs) {
-  const Casters casters(content, content.scenes[scene]);
-  const std::vector<glm::dvec3>& corners = casters.corners();
+  const std::vector<Casters> poses = poses_of(content, scene);
   glm::dvec3 low(1e30);
   glm::dvec3 high(-1e30);
-  for (const glm::dvec3& corner : corners) {
-    low = glm::min(low, corner);
-    high = glm::max(high, corner);
+  for (const Casters& casters : poses) {
+    for (const glm::dvec3& corner : casters.corners()) {
+      low = glm::min(low, corner);
+      high = glm::max(high, corner);
+    }
   }
-  if (corners.empty() || high.z <= kLift) return {};
+  if (poses[0].corners().empty() || high.z <= kLift) return {};
   const double margin = kMargin * (high.z - std::max(low.z, 0.0)) + 0.05;
   ShadowHeader header{kShadowSide, kShadowSide, {}, {}, {}};
   for (int axis = 0; axis < 2; ++axis) {
@@ -285,7 +306,11 @@ std::vector<std::byte> scene_shadow(const BundleContent& content, std::uint32_t 
                                 static_cast<double>(header.low[1]), place(row));
       double& left = shares[row * kShadowSide + column];
       for (std::size_t i = row % 2 * 2 + column % 2; i < rays.size(); i += kParts) {
-        left += rays[i].light * casters.left({x, y, kLift}, rays[i].direction, reach);
+        double through = 0;
+        for (const Casters& casters : poses) {
+          through += casters.left({x, y, kLift}, rays[i].direction, reach);
+        }
+        left += rays[i].light * through / static_cast<double>(poses.size());
       }
     }
   });

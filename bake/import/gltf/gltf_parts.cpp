@@ -25,6 +25,17 @@ void begin_run(std::vector<FaceRun>& runs, std::uint64_t face, std::uint32_t val
   if (runs.empty() || runs.back().value != value) runs.push_back({face, value});
 }
 
+/// How much of a primitive each bone moves; 0 for those of vertices that name none that exists.
+std::vector<double> bone_weights(const VertexPlaces& places, std::size_t vertices,
+                                 std::size_t bones) {
+  std::vector<double> sums(bones, 0);
+  for (std::size_t v = 0; v < vertices; ++v) {
+    if (!places.of(v)) continue;
+    for (const BoneShare& share : places.shares(v)) sums[share.bone] += share.weight;
+  }
+  return sums;
+}
+
 template <class T>
 void push_twin(Array<T>& values, std::uint32_t of) {
   if (values.empty()) return;
@@ -59,7 +70,8 @@ glm::dmat4 GltfParts::to_stored(std::size_t node) const {
   return clips_.stored[clips_.node_joints[node]] * clips_.node_places[node];
 }
 
-std::uint32_t GltfParts::of_skin(std::size_t skin, const SkinPoses& skins) {
+std::uint32_t GltfParts::of_skin(std::size_t skin, const SkinPoses& skins,
+                                 const VertexPlaces& places, std::size_t vertices) {
   const std::vector<int>& nodes = gltf_.skins[skin].joints;
   const auto moves = [this](int node) {
     return clips_.node_joints[static_cast<std::size_t>(node)] != kNoJoint;
@@ -70,7 +82,8 @@ std::uint32_t GltfParts::of_skin(std::size_t skin, const SkinPoses& skins) {
   if (!fresh) return found->second;
   Group group;
   std::vector<glm::dmat4> in_joint;  // from the mesh
-  bool placed = false;
+  double most = 0;
+  const std::vector<double> weights = bone_weights(places, vertices, nodes.size());
   for (std::size_t j = 0; j < nodes.size(); ++j) {
     const auto node = static_cast<std::size_t>(nodes[j]);
     const std::uint32_t moved = clips_.node_joints[node];
@@ -78,11 +91,11 @@ std::uint32_t GltfParts::of_skin(std::size_t skin, const SkinPoses& skins) {
     group.bones.push_back({joint, glm::dmat4(1.0)});
     in_joint.push_back(clips_.node_places[node] * skins.inverse(skin, j));
     const glm::dmat4 stored = clips_.stored[joint] * in_joint.back();
-    if (placed || !invertible(stored)) continue;
-    // The pose in which the mesh was bound, as the first joint has it: with another, no matrix of
-    // each bone would undo it.
+    if (!(weights[j] > most) || !invertible(stored)) continue;
+    // The pose in which the mesh was bound, moved to where the bone of most of it is: with another,
+    // no matrix of each bone would undo it.
     group.to_stored = stored;
-    placed = true;
+    most = weights[j];
   }
   const glm::dmat4 back = glm::inverse(group.to_stored);
   for (std::size_t j = 0; j < nodes.size(); ++j) group.bones[j].inverse = in_joint[j] * back;

@@ -25,9 +25,11 @@ class GltfParts {
   static constexpr std::uint32_t kStill = 0xFFFFFFFFu;
 
   [[nodiscard]] bool any() const { return !clips_.clips.empty(); }
-  /// The groups of a node's mesh without a skin, and of a skin's; kStill: nothing moves it.
+  /// The groups of a node's mesh without a skin, and of a skin's; kStill: nothing moves it. places:
+  /// of the skin's first primitive, which has `vertices`.
   std::uint32_t of_node(std::size_t node);
-  std::uint32_t of_skin(std::size_t skin, const SkinPoses& skins);
+  std::uint32_t of_skin(std::size_t skin, const SkinPoses& skins, const VertexPlaces& places,
+                        std::size_t vertices);
   [[nodiscard]] const Group& group(std::uint32_t index) const { return groups_[index]; }
   /// From a node to where the vertices of its mesh are stored.
   [[nodiscard]] glm::dmat4 to_stored(std::size_t node) const;
