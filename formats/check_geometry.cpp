@@ -228,8 +228,8 @@ class GeometryCheck {
         reinterpret_cast<const std::uint16_t*>(parts_.indices.data() + level.index_offset);
     for (std::uint32_t i = 0; i < level.index_count; ++i) {
       if (indices[i] >= level.vertex_count) continue;  // told by check_level()
-      const std::byte* vertex = parts_.vertices.data() + level.vertex_offset +
-                                std::size_t{indices[i]} * layout.stride;
+      const std::byte* vertex =
+          parts_.vertices.data() + level.vertex_offset + std::size_t{indices[i]} * layout.stride;
       std::uint32_t sum = 0;
       bool good = true;
       for (std::size_t k = 0; k < 4; ++k) {

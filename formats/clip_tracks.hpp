@@ -61,8 +61,8 @@ struct ClipTracksView {
   [[nodiscard]] TrackValue at(const TrackRecord& track, float sample, std::uint32_t& key) const;
 };
 
-/// A clip's tracks in their bytes, which must be aligned to 4. Answers the fault of damaged ones, or
-/// nullptr.
+/// A clip's tracks in their bytes, which must be aligned to 4. Answers the fault of damaged ones,
+/// or nullptr.
 const char* view_clip_tracks(std::span<const std::byte> bytes, std::uint32_t joints,
                              ClipTracksView& view);
 

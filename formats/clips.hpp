@@ -9,7 +9,7 @@
 
 namespace modar {
 
-inline constexpr std::uint32_t kMostClips = 256;   ///< of a bundle
+inline constexpr std::uint32_t kMostClips = 256;  ///< of a bundle
 inline constexpr float kLeastClipSeconds = 1.0f / 1024;
 inline constexpr float kMostClipSeconds = 546.0f;  ///< kMaxClipSamples at kClipRate
 
@@ -17,8 +17,8 @@ inline constexpr float kMostClipSeconds = 546.0f;  ///< kMaxClipSamples at kClip
 struct ClipRecord {
   NameRef name;          ///< not empty; no other clip of the model has it
   std::uint32_t model;   ///< index into kModels; those of one model follow each other
-  std::uint32_t tracks;  ///< the clip that owns the kClipTracks section: this one, or an earlier one
-                         ///< whose tracks are the same
+  std::uint32_t tracks;  ///< the clip that owns the kClipTracks section: this one, or an earlier
+                         ///< one whose tracks are the same
   float seconds;
   float error;  ///< model space: no vertex is further from the source's place, at any sample
   std::uint32_t reserved[2];
@@ -38,12 +38,12 @@ struct JointRecord {
 };
 static_assert(sizeof(JointRecord) == 96);
 
-/// What moves vertices: model space at a time of a clip = matrix of the joint * inverse * position
-/// as it is stored, the rest pose.
+/// What moves vertices: model space at a time of a clip = matrix of the joint * inverse * stored
+/// position.
 struct BoneRecord {
   std::uint32_t joint;  ///< index into kJoints
   std::uint32_t reserved[3];
-  float inverse[12];  ///< rows of a 3x4 matrix: from the rest pose in model space to the joint's
+  float inverse[12];  ///< rows of a 3x4 matrix: from the stored place to the joint's space
 };
 static_assert(sizeof(BoneRecord) == 64);
 
@@ -54,7 +54,8 @@ struct PartRecord {
   std::uint32_t first_bone;
   std::uint32_t bone_count;  ///< 1 to kMostPartBones
   std::uint32_t reserved;
-  float bounds_min[3];  ///< model space, conservative over all clips and the rest pose
+  float
+      bounds_min[3];  ///< model space, conservative over all clips, the rest pose and stored places
   float bounds_max[3];
 };
 static_assert(sizeof(PartRecord) == 40);

@@ -14,7 +14,15 @@
 namespace modar {
 
 /// What the index in a section's `owner` counts; kNothing: it has none, and its variant is 0.
-enum class SectionOwner : std::uint8_t { kNothing, kPattern, kScene, kChunk, kTexture, kMedia, kClip };
+enum class SectionOwner : std::uint8_t {
+  kNothing,
+  kPattern,
+  kScene,
+  kChunk,
+  kTexture,
+  kMedia,
+  kClip
+};
 
 enum SectionFlags : std::uint16_t {
   kSectionRequired = 1,  ///< a reader that does not know the type must refuse the bundle

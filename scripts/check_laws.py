@@ -106,7 +106,7 @@ DOORS = {
     "bake/import": ("read_model.hpp", "source_model.hpp", "gltf/tinygltf_library.hpp"),
     "bake/video": ("video.hpp", "encode_video.hpp"),
     "bake/mesh": ("tri_mesh.hpp", "upright.hpp", "draw_order.hpp"),
-    "bake/mesh/clip": ("clip_fit.hpp", "movement.hpp"),
+    "bake/mesh/clip": ("movement.hpp",),
     "bake/mesh/weld": ("weld.hpp", "triangulate.hpp"),
     "bake/mesh/repair": ("repair.hpp",),
     "bake/mesh/topology": ("mesh_topology.hpp",),

@@ -389,7 +389,7 @@ Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& 
     chunked->mesh.occlusion = measure_occlusion(*chunked, request.jobs, report);
   }
   LevelOptions level_options;
-  // Joints bend what is flat in the pose that is stored: coarser levels would lack its folds.
+  // Joints bend flat parts of the stored pose, and coarser levels would lack the folds.
   level_options.levels = chunked->mesh.vertex_bones.empty() ? request.levels : 1;
   level_options.positions = plan->kind;
   level_options.jobs = request.jobs;

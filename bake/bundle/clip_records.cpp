@@ -127,8 +127,9 @@ Diagnostic clips_found(const std::string& model, const FittedMovement& fitted) {
           DiagnosticSeverity::kInfo,
           model,
           0,
-          (several ? "it has the clips " + quoted(names) + ": scenes play the first" 
-                   : "scenes play its clip " + quoted(names)) + " in a loop",
+          (several ? "it has the clips " + quoted(names) + ": scenes play the first"
+                   : "scenes play its clip " + quoted(names)) +
+              " in a loop",
           several ? "--scene PATTERN=" + model + ",clip=" + names[1] +
                         " plays another, clip=none keeps it still"
                   : "--scene PATTERN=" + model + ",clip=none keeps it still"};

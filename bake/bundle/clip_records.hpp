@@ -28,7 +28,8 @@ void add_clip(ClipRecord clip, std::vector<std::byte> tracks, BundleContent& con
 Diagnostic clips_found(const std::string& model, const FittedMovement& fitted);
 
 /// What each scene plays from when its pattern is found: as the request says it, or else the first
-/// clip of its model, in a loop. Errors: kUsage "scene.clip" where a model has no clip of that name.
+/// clip of its model, in a loop. Errors: kUsage "scene.clip" where a model has no clip of that
+/// name.
 Result<void> add_scene_clips(const std::vector<SceneRequest>& scenes, BundleContent& content);
 
 }  // namespace modar

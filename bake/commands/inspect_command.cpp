@@ -45,8 +45,7 @@ void print_models(const BundleView& bundle) {
     for (const ClipRecord& clip : bundle.clips()) {
       if (clip.model != m) continue;
       std::printf("  clip %s: %.3g s, error %.2g\n", std::string(bundle.name(clip.name)).c_str(),
-                  static_cast<double>(clip.seconds),
-                  static_cast<double>(clip.error) * model.scale);
+                  static_cast<double>(clip.seconds), static_cast<double>(clip.error) * model.scale);
     }
   }
 }

@@ -36,8 +36,8 @@ struct SourceJoint {
 
 enum class Interpolation : std::uint8_t { kStep, kLinear, kCubic };
 
-/// Times never fall, in seconds; the values before the first and behind the last hold. Of kCubic each
-/// time has three values: tangent before, value, tangent behind.
+/// Times never fall, in seconds; the values before the first and behind the last hold. Of kCubic
+/// each time has three values: tangent before, value, tangent behind.
 struct SourceTrack {
   std::uint32_t joint = 0;
   TrackPath path = TrackPath::kTranslation;

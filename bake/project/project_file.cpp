@@ -549,11 +549,10 @@ class ProjectReader {
   }
 
   Result<void> read_scene(const TableReader& reader, std::size_t table) {
-    MODAR_TRY(
-        told(reader.allow({"pattern", "model",   "scale", "height", "width", "up",    "turn",
-                           "offset",  "centred", "light", "text",   "alt",   "name",  "hidden",
-                           "group",   "picture", "video", "sound",  "label", "action", "clip",
-                           "once"})));
+    MODAR_TRY(told(
+        reader.allow({"pattern", "model", "scale", "height", "width", "up",     "turn",  "offset",
+                      "centred", "light", "text",  "alt",    "name",  "hidden", "group", "picture",
+                      "video",   "sound", "label", "action", "clip",  "once"})));
     ProjectScene scene;
     scene.table = table;
     scene.where = reader.where();

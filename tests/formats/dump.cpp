@@ -127,8 +127,8 @@ void add_digests(const BundleView& view, const LayoutRecord& layout, const Chunk
     for (std::size_t v = 0; v < level.vertex_count; ++v) {
       append_decoded(attribute, chunk, first + v * layout.stride, values);
     }
-    const char* names[] = {"", "positions", "normals", "uvs", "colours", "normals",
-                           "joints", "weights"};
+    const char* names[] = {"",        "positions", "normals", "uvs",
+                           "colours", "normals",   "joints",  "weights"};
     out[names[attribute.semantic]] = digest(values.data(), values.size() * sizeof(double));
   }
   out["indices"] = digest(view.indices().subspan(level.index_offset, level.index_count * 2));

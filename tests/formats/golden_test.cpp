@@ -65,7 +65,8 @@ TEST(GoldenFiles, WriterMakesTheReleasedBytes) {
 }
 
 class Golden : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Versions, Golden, ::testing::Values("v1_0", "v1_1", "v1_2", "v1_3", "v1_4"));
+INSTANTIATE_TEST_SUITE_P(Versions, Golden,
+                         ::testing::Values("v1_0", "v1_1", "v1_2", "v1_3", "v1_4"));
 
 TEST_P(Golden, BothReadersDecodeTheSame) {
   const std::string path = source_path(std::string("tests/golden/") + GetParam() + ".modar");

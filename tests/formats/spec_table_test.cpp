@@ -153,8 +153,8 @@ std::map<std::string, Struct> compiled() {
                F(bounds_max))
   MODAR_STRUCT(SceneClipRecord, F(scene), F(clip), F(flags), F(reserved))
   MODAR_STRUCT(ClipTracksHeader, F(track_count), F(sample_count), F(reserved))
-  MODAR_STRUCT(TrackRecord, F(joint), F(path), F(reserved0), F(key_count), F(keys), F(low),
-               F(step), F(reserved1))
+  MODAR_STRUCT(TrackRecord, F(joint), F(path), F(reserved0), F(key_count), F(keys), F(low), F(step),
+               F(reserved1))
   MODAR_STRUCT(ColourGridHeader, F(columns), F(rows), F(reserved))
   MODAR_STRUCT(PatternShapeHeader, F(kind), F(face_count), F(half_arc), F(slope), F(reserved))
   MODAR_STRUCT(ShapeFaceRecord, F(place), F(corner), F(right), F(down), F(reserved))

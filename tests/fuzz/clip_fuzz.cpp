@@ -1,4 +1,5 @@
-// libFuzzer target: any bytes as the tracks of a clip are refused, or give finite places at any time.
+// libFuzzer target: any bytes as the tracks of a clip are refused, or give finite places at any
+// time.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>

@@ -145,7 +145,7 @@ TEST(Clips, MovementStatesItsErrorAndBoxes) {
   }
 }
 
-/// A file with a part of its text replaced, as it is read.
+/// A file with a part of its text replaced.
 Result<SourceModel> changed_model(const std::string& name,
                                   const std::vector<std::pair<std::string, std::string>>& changes) {
   std::ifstream file(clip_file(name));
@@ -183,7 +183,8 @@ TEST(Clips, WhatIsMalformedIsAFinding) {
   const Case cases[] = {
       {{{"\"path\": \"rotation\"", "\"path\": \"pointer\""}}, "KHR_animation_pointer"},
       {{{"\"path\": \"rotation\"", "\"path\": \"weights\""}}, "weights of morph targets"},
-      {{{"\"target\": {\"node\": 2,", "\"target\": {\"node\": 999,"}}, "a target that does not exist"},
+      {{{"\"target\": {\"node\": 2,", "\"target\": {\"node\": 999,"}},
+       "a target that does not exist"},
       {{{"\"sampler\": 0", "\"sampler\": 99"}}, "a sampler that does not exist"},
       {{{"\"input\": 6", "\"input\": 4"}}, "keys whose times fall"},
       {{{"\"output\": 7", "\"output\": 0"}}, "values that are missing"},
@@ -197,9 +198,10 @@ TEST(Clips, WhatIsMalformedIsAFinding) {
 }
 
 TEST(Clips, BrokenSkinsAreErrors) {
-  for (const auto& [from, to] : {std::pair<std::string, std::string>{"\"joints\": [2, ", "\"joints\": [999, "},
-                                 {"\"JOINTS_0\": 2", "\"JOINTS_0\": 4"},
-                                 {"\"children\": [3]", "\"children\": [0]"}}) {
+  for (const auto& [from, to] :
+       {std::pair<std::string, std::string>{"\"joints\": [2, ", "\"joints\": [999, "},
+        {"\"JOINTS_0\": 2", "\"JOINTS_0\": 4"},
+        {"\"children\": [3]", "\"children\": [0]"}}) {
     EXPECT_FALSE(changed_model("skinned.gltf", {{from, to}})) << from;
   }
 }
@@ -258,9 +260,11 @@ TEST(Clips, PackedTracksStayWithinTheBound) {
 TEST(Clips, WhatMovesNothingGivesNoBytes) {
   SourceModel model = moving_model();
   const std::array points = {points_of(model)};
-  EXPECT_TRUE(fit_clip(model.movement.joints, model.movement.clips.at(0), points, 100).bytes.empty());
+  EXPECT_TRUE(
+      fit_clip(model.movement.joints, model.movement.clips.at(0), points, 100).bytes.empty());
   const std::array nowhere = {JointPoints{points[0].joint, {}}};
-  EXPECT_TRUE(fit_clip(model.movement.joints, model.movement.clips.at(0), nowhere, 1e-3).bytes.empty());
+  EXPECT_TRUE(
+      fit_clip(model.movement.joints, model.movement.clips.at(0), nowhere, 1e-3).bytes.empty());
 }
 
 TEST(Clips, RotationsKeepTheirDirectionIn48Bits) {
@@ -281,7 +285,8 @@ TEST(Clips, RotationsKeepTheirDirectionIn48Bits) {
 TEST(Clips, DamagedTracksAreRefusedOrAnswer) {
   const SourceModel model = moving_model();
   const std::array points = {points_of(model)};
-  const FittedClip fitted = fit_clip(model.movement.joints, model.movement.clips.at(0), points, 1e-2);
+  const FittedClip fitted =
+      fit_clip(model.movement.joints, model.movement.clips.at(0), points, 1e-2);
   std::mt19937 random(11);
   int refused = 0;
   for (int i = 0; i < 20000; ++i) {

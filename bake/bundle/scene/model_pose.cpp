@@ -110,9 +110,12 @@ std::uint32_t first_clip(const BundleContent& content, std::uint32_t model) {
 
 ModelPose pose_at(const BundleContent& content, std::uint32_t clip, double share) {
   if (clip == kNone) return {};
-  return {content.joints,      content.bones,
-          content.parts,       content.clips[clip],
-          content.clip_tracks[content.clips[clip].tracks], share};
+  return {content.joints,
+          content.bones,
+          content.parts,
+          content.clips[clip],
+          content.clip_tracks[content.clips[clip].tracks],
+          share};
 }
 
 ModelPose first_pose(const BundleContent& content, std::uint32_t model) {
@@ -122,9 +125,12 @@ ModelPose first_pose(const BundleContent& content, std::uint32_t model) {
 ModelPose first_pose(const BundleView& bundle, std::uint32_t model) {
   for (const ClipRecord& clip : bundle.clips()) {
     if (clip.model != model) continue;
-    return {copied(bundle.joints()),       copied(bundle.bones()),
-            copied(bundle.moving_parts()), clip,
-            bundle.section(SectionType::kClipTracks, clip.tracks), 0};
+    return {copied(bundle.joints()),
+            copied(bundle.bones()),
+            copied(bundle.moving_parts()),
+            clip,
+            bundle.section(SectionType::kClipTracks, clip.tracks),
+            0};
   }
   return {};
 }

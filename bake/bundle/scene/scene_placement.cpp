@@ -78,7 +78,8 @@ bool keeps_boxes(const glm::dmat3& turn) {
   return true;
 }
 
-/// Of the vertices of a model's finest level, in a pose. Chunks, Levels: of a bundle that is written or read.
+/// Of the vertices of a model's finest level, in a pose. Chunks, Levels: of a bundle that is
+/// written or read.
 template <class Chunks, class Levels>
 TurnedBox box_of_vertices(const ModelRecord& model, const LayoutRecord& layout,
                           const Chunks& chunks, const Levels& levels,

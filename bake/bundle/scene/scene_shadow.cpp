@@ -132,8 +132,7 @@ class Casters {
   std::optional<RayTree> tree_;
 };
 
-void Casters::place(const BundleContent& content, const SceneRecord& scene,
-                    const ModelPose& pose) {
+void Casters::place(const BundleContent& content, const SceneRecord& scene, const ModelPose& pose) {
   const ModelRecord& model = content.models[scene.model];
   const auto count_at = [&](std::uint32_t depth) {
     std::size_t count = 0;

@@ -30,7 +30,7 @@ bool read_times(const tinygltf::Model& gltf, int index, std::vector<double>& tim
     return false;
   for (std::size_t i = 0; i < accessor.size(); ++i) {
     const double time = accessor.at(i, 0);
-    // NaN is in no order. Of two at one time the first ends what is before, the second begins.
+    // NaN is in no order. Two keys at one time are a jump.
     if (!(time >= 0 && time < 1e6) || (i > 0 && !(time >= times.back()))) return false;
     times.push_back(time);
   }
@@ -173,8 +173,8 @@ class JointFinder {
 std::vector<glm::dmat4> stored_places(const GltfClips& clips) {
   std::vector<JointPlace> places;
   for (const SourceJoint& joint : clips.joints) places.push_back(joint.rest);
-  for (const SourceTrack& track : clips.clips.empty() ? std::vector<SourceTrack>()
-                                                      : clips.clips.front().tracks) {
+  for (const SourceTrack& track :
+       clips.clips.empty() ? std::vector<SourceTrack>() : clips.clips.front().tracks) {
     const glm::dvec4 value = track.at(0);
     JointPlace& place = places[track.joint];
     if (track.path == TrackPath::kTranslation) place.translation = glm::dvec3(value);
@@ -235,8 +235,7 @@ GltfClips gltf_clips(const tinygltf::Model& gltf, const std::vector<int>& roots,
   std::vector<ReadAnimation> animations;
   std::vector<bool> moved(gltf.nodes.size(), false);
   const auto warn = [&](const std::string& message, const char* cure) {
-    diagnostics.push_back(
-        {"gltf.clip", DiagnosticSeverity::kWarning, label, 0, message, cure});
+    diagnostics.push_back({"gltf.clip", DiagnosticSeverity::kWarning, label, 0, message, cure});
   };
   for (std::size_t i = 0; i < gltf.animations.size(); ++i) {
     animations.push_back(read_channels(gltf, gltf.animations[i]));

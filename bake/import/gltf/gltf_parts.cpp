@@ -202,7 +202,8 @@ void GltfParts::drop_unused_joints(SourceMovement& movement) const {
     for (SourceBone& bone : part.bones) bone.joint = to[bone.joint];
   }
   for (SourceClip& clip : movement.clips) {
-    std::erase_if(clip.tracks, [&](const SourceTrack& track) { return to[track.joint] == kNoJoint; });
+    std::erase_if(clip.tracks,
+                  [&](const SourceTrack& track) { return to[track.joint] == kNoJoint; });
     for (SourceTrack& track : clip.tracks) track.joint = to[track.joint];
   }
 }

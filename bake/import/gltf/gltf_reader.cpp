@@ -242,9 +242,9 @@ class SceneReader {
     if (!places) return wrong("gltf.skin", "a skin, its joints or its weights are broken");
     const auto first = static_cast<std::uint32_t>(model_.positions.size());
     const std::uint32_t group =
-        places->skinned() ? parts_.of_skin(static_cast<std::size_t>(skin), skins_, *places,
-                                           positions.size())
-                          : parts_.of_node(node_);
+        places->skinned()
+            ? parts_.of_skin(static_cast<std::size_t>(skin), skins_, *places, positions.size())
+            : parts_.of_node(node_);
     const bool moves = group != GltfParts::kStill;
     std::optional<glm::dmat4> place = places->of(0);
     if (moves && place) place = stored_place(*places, group, copy);

@@ -26,7 +26,7 @@ constexpr std::uint32_t kStretches = 64;  ///< of samples, measured by one threa
 using PartBox = FittedMovement::Box;
 
 constexpr PartBox kNowhere = {glm::dvec3(std::numeric_limits<double>::infinity()),
-                          glm::dvec3(-std::numeric_limits<double>::infinity())};
+                              glm::dvec3(-std::numeric_limits<double>::infinity())};
 
 void extend(PartBox& box, const glm::dvec3& at) {
   box.low = glm::min(box.low, at);
@@ -146,7 +146,8 @@ class Measure {
     view_clip_tracks(bytes, static_cast<std::uint32_t>(joints().size()), view);
     const std::uint32_t samples = view.header->sample_count;
     std::vector<double> errors(kStretches, 0);
-    std::vector<std::vector<PartBox>> boxes(kStretches, std::vector<PartBox>(boxes_.size(), kNowhere));
+    std::vector<std::vector<PartBox>> boxes(kStretches,
+                                            std::vector<PartBox>(boxes_.size(), kNowhere));
     parallel_rows(kStretches, jobs_, [&](std::uint32_t s) {
       std::vector<std::uint32_t> keys;
       const auto end = static_cast<std::uint32_t>(std::uint64_t{samples} * (s + 1) / kStretches);

@@ -26,9 +26,9 @@ struct FittedMovement {
 };
 
 /// bound: scene units, greatest distance of a vertex from its place in the source that keys may
-/// cost at any sample; each clip states the distance that all vertices have, with their weights as
-/// they are stored. Clips that are too long for the memory of a workstation are left out, with a
-/// diagnostic. The result does not depend on `jobs`.
+/// cost at any sample; each clip states the distance that all vertices have, with stored weights.
+/// Clips that are too long for the memory of a workstation are left out, with a diagnostic. The
+/// result does not depend on `jobs`.
 FittedMovement fit_movement(const SourceModel& model, double bound, unsigned jobs,
                             std::vector<Diagnostic>& diagnostics);
 
