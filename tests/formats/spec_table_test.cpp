@@ -14,6 +14,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "formats/clips.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/draw_order.hpp"
 #include "formats/field_table.hpp"
