@@ -304,7 +304,7 @@ TEST(Check, ANewerMinorVersionIsForDevicesOnly) {
   reinterpret_cast<FileHeader*>(bytes.data())->minor = kMinorVersion + 5;
   rehash(bytes);
   EXPECT_EQ(report(bytes).front(),
-            "error BUNDLE_MINOR header (byte 10): it states 1.8, this program knows up to 1.3 and "
+            "error BUNDLE_MINOR header (byte 10): it states 1.9, this program knows up to 1.4 and "
             "cannot judge what that added");
   EXPECT_EQ(first_error(bytes), "BUNDLE_MINOR header");
   EXPECT_EQ(first_error(bytes, {.release = {}, .accept_newer = true}), "");

@@ -135,7 +135,7 @@ TEST(Clips, MovementStatesItsErrorAndBoxes) {
   EXPECT_TRUE(diagnostics.empty());
   ASSERT_EQ(fitted.clips.size(), 1U);
   EXPECT_EQ(fitted.clips[0].name, "bend");
-  EXPECT_LT(fitted.clips[0].fitted.error, 2e-3);
+  EXPECT_LT(fitted.clips[0].fitted.error, 5e-3) << "40 rotations of 48 bits in a row";
   for (const glm::dvec3& at : expected_places("skinned.txt")) {
     const auto inside = [&](const FittedMovement::Box& box) {
       return glm::all(glm::greaterThanEqual(at, box.low)) &&
@@ -170,9 +170,10 @@ TEST(Clips, MissingInverseBindMatricesAreIdentities) {
   const auto model = changed_model("skinned.gltf", {{", \"inverseBindMatrices\": 5", ""}});
   ASSERT_TRUE(model) << to_line(model.error());
   ASSERT_EQ(model->movement.clips.size(), 1U);
-  // Without them a vertex at the first joint's place is moved on by the joints of its chain.
+  // Each vertex is then moved on by its joint from where the mesh has it.
   const auto pose = clip_pose(model->movement.joints, {}, 0);
-  EXPECT_GT(posed(*model, pose, 79, 1).y, posed(model_of("skinned.gltf"), pose, 79, 1).y + 1);
+  const SourceModel bound = model_of("skinned.gltf");
+  EXPECT_GT(glm::distance(posed(*model, pose, 79, 1), posed(bound, pose, 79, 1)), 1);
 }
 
 TEST(Clips, WhatIsMalformedIsAFinding) {
