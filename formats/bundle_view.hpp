@@ -198,4 +198,18 @@ class BundleView {
   BundleParts parts_;
 };
 
+/// Boxes that hold a model in every pose of its clips, as arrays of three floats: the least and the
+/// greatest corner.
+template <class Visit>
+void visit_boxes(const BundleView& bundle, const ModelRecord& model, const Visit& visit) {
+  for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
+    const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
+    visit(chunk.bounds_min, chunk.bounds_max);
+  }
+  for (const PartRecord& part : bundle.moving_parts()) {
+    if (part.material - model.first_material < model.material_count)
+      visit(part.bounds_min, part.bounds_max);
+  }
+}
+
 }  // namespace modar

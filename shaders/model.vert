@@ -3,6 +3,7 @@
 // items, a slot is three rows of the affine matrix from attribute space to eye space, and the scale
 // and offset of uv; light comes in eye space.
 // Defines: NORMAL_XYZ or NORMAL_OCT; TEXTURED; COLOURED; SHINY (adds a highlight, what it mirrors, emission);
+// SKINNED (bones turn vertices in model space, which is attribute space then);
 // SLOT_STREAM with SLOT_COUNT (a vertex chooses its slot), or SLOT_ATTRIBUTES (rows step once an
 // instance), or neither: one item, whose matrix keeps angles.
 //
@@ -10,6 +11,22 @@
 // that equals a product in linear light where the transfer function is a power, so the sum is
 // handed over encoded, and the fragment's work is that of one product.
 attribute vec3 a_position;
+#ifdef SKINNED
+// Bones of the part, three rows each; from a_position to model space: an offset, and a step in w.
+attribute vec4 a_joints;
+attribute vec4 a_weights;
+uniform vec4 u_bones[96];
+uniform vec4 u_decode;
+vec4 bone0 = vec4(0.0);
+vec4 bone1 = vec4(0.0);
+vec4 bone2 = vec4(0.0);
+void add_bone(float joint, float weight) {
+  int row = 3 * int(joint + 0.5);
+  bone0 += weight * u_bones[row];
+  bone1 += weight * u_bones[row + 1];
+  bone2 += weight * u_bones[row + 2];
+}
+#endif
 #ifdef NORMAL_XYZ
 // w: the share of the light from all around that reaches the vertex; 1 where nobody measured it.
 attribute vec4 a_normal;
@@ -110,28 +127,40 @@ void main() {
   vec4 row2 = u_slots[base + 2];
   vec4 uv_map = u_slots[base + 3];
 #endif
+#ifdef SKINNED
+  add_bone(a_joints.x, a_weights.x);
+  add_bone(a_joints.y, a_weights.y);
+  add_bone(a_joints.z, a_weights.z);
+  add_bone(a_joints.w, a_weights.w);
+  vec4 rest = vec4(u_decode.xyz + u_decode.w * a_position, 1.0);
+  vec4 point = vec4(dot(bone0, rest), dot(bone1, rest), dot(bone2, rest), 1.0);
+#else
+  vec4 point = vec4(a_position, 1.0);
+#endif
   // From the camera to the vertex.
 #ifdef SLOTS
-  vec4 point = vec4(a_position, 1.0);
   vec3 ray = vec3(dot(row0, point), dot(row1, point), dot(row2, point));
   gl_Position = u_projection * vec4(ray, 1.0);
 #else
   vec4 uv_map = u_uv_map;
-  vec3 ray = a_position - u_eye.xyz;
-  gl_Position = u_to_clip * vec4(a_position, 1.0);
+  vec3 ray = point.xyz - u_eye.xyz;
+  gl_Position = u_to_clip * point;
 #endif
 
 #if defined(NORMAL_XYZ) || defined(NORMAL_OCT)
+  vec3 n = model_normal();
+#ifdef SKINNED
+  n = vec3(dot(bone0.xyz, n), dot(bone1.xyz, n), dot(bone2.xyz, n));
+#endif
 #ifdef SLOTS
   // Normals go by the cofactors of the matrix; a mirror turns their sign with the determinant.
   vec3 cofactor0 = cross(row1.xyz, row2.xyz);
   vec3 cofactor1 = cross(row2.xyz, row0.xyz);
   vec3 cofactor2 = cross(row0.xyz, row1.xyz);
-  vec3 n = model_normal();
   n = vec3(dot(cofactor0, n), dot(cofactor1, n), dot(cofactor2, n));
   n = normalize(n) * sign(dot(row0.xyz, cofactor0));
 #else
-  vec3 n = normalize(model_normal());
+  n = normalize(n);
 #endif
   if (u_diffuse.w > 0.5) n = faceforward(n, ray, n);
   vec3 sky = sky_along(n, vec2(1.0));

@@ -29,7 +29,8 @@ MODAR_ENDS_WITH(modar_picture, chroma_step);
 MODAR_ENDS_WITH(modar_pose, reserved);
 MODAR_ENDS_WITH(modar_tracker_options, reserved);
 MODAR_ENDS_WITH(modar_turntable, zoom);
-MODAR_ENDS_WITH(modar_item, node);
+MODAR_ENDS_WITH(modar_item, bones);
+MODAR_ENDS_WITH(modar_clip, seconds);
 MODAR_ENDS_WITH(modar_drawing, item_count);
 MODAR_ENDS_WITH(modar_render_stats, bytes_uploaded);
 MODAR_ENDS_WITH(modar_render_options, reserved);
@@ -145,11 +146,10 @@ int modar_model_bounds(const modar_bundle* bundle, uint32_t index, float low[3],
   for (std::size_t axis = 0; axis < 3; ++axis) {
     low[axis] = std::numeric_limits<float>::max();
     high[axis] = std::numeric_limits<float>::lowest();
-    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-      const modar::ChunkRecord& chunk = bundle->view.chunks()[model.first_chunk + c];
-      low[axis] = std::min(low[axis], chunk.bounds_min[axis]);
-      high[axis] = std::max(high[axis], chunk.bounds_max[axis]);
-    }
+    modar::visit_boxes(bundle->view, model, [&](const auto& least, const auto& greatest) {
+      low[axis] = std::min(low[axis], least[axis]);
+      high[axis] = std::max(high[axis], greatest[axis]);
+    });
   }
   return 1;
 }

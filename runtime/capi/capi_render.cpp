@@ -105,6 +105,12 @@ void set_key(modar::RenderOptions& options, const float* direction) {
   options.light->direction = to_light;
 }
 
+/// The caller's floats are matrices.
+const modar::BoneMatrix* bones_of(const modar_item& item) {
+  static_assert(sizeof(modar::BoneMatrix) == 12 * sizeof(float));
+  return reinterpret_cast<const modar::BoneMatrix*>(item.bones);
+}
+
 /// The items of models that there are and whose numbers are usable, into the renderer's own list.
 void take_items(modar_renderer& renderer, const modar_drawing& drawing) {
   renderer.items.clear();
@@ -120,6 +126,7 @@ void take_items(modar_renderer& renderer, const modar_drawing& drawing) {
     const glm::mat4 world = glm::make_mat4(asked.world_to_eye);
     if (world != glm::mat4(0.0f)) item.world_to_eye = world;
     if (asked.opacity > 0.0f && asked.opacity < 1.0f) item.opacity = asked.opacity;
+    item.bones = bones_of(asked);
     renderer.items.push_back(item);
   }
 }
@@ -282,6 +289,7 @@ int modar_pick(const modar_bundle* bundle, const modar_drawing* drawing, double 
     if (!modar::usable(asked)) return 0;
     ours.push_back({asked.model, glm::make_mat4(asked.to_eye), modar::kNone, {}});
     ours.back().node = asked.node - 1;
+    ours.back().bones = bones_of(asked);
   }
   const auto found =
       modar::pick(bundle->view, modar::camera_of(*drawn.camera), {frame_x, frame_y}, ours);

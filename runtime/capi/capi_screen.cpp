@@ -288,6 +288,45 @@ int modar_screen_waiting(const modar_screen* screen) {
   return screen != nullptr && screen->machine.waiting() ? 1 : 0;
 }
 
+uint32_t modar_clip_count(const modar_bundle* bundle) {
+  return bundle == nullptr ? 0 : bundle->view.clips().size();
+}
+
+int modar_clip_at(const modar_bundle* bundle, uint32_t index, modar_clip* clip) {
+  if (index >= modar_clip_count(bundle) || clip == nullptr) return 0;
+  const modar::ClipRecord& record = bundle->view.clips()[index];
+  modar::give({0, record.model, record.seconds}, clip);
+  return 1;
+}
+
+size_t modar_clip_name(const modar_bundle* bundle, uint32_t index, char* text, size_t size) {
+  if (index >= modar_clip_count(bundle)) return 0;
+  return modar::copy_name(bundle->view.name(bundle->view.clips()[index].name), text, size);
+}
+
+int modar_clip_play(modar_screen* screen, uint32_t scene, uint32_t clip, int loops,
+                    double blend_s) {
+  if (screen == nullptr || !modar::usable(blend_s)) return 0;
+  return screen->machine.play(scene, clip, loops != 0, blend_s) ? 1 : 0;
+}
+
+void modar_clip_stop(modar_screen* screen, uint32_t scene) {
+  if (screen != nullptr) screen->machine.stop(scene);
+}
+
+uint32_t modar_clip_playing(const modar_screen* screen, uint32_t scene) {
+  return screen == nullptr ? 0 : screen->machine.playing(scene) + 1;
+}
+
+size_t modar_clip_bones(const modar_screen* screen, uint32_t scene, float* rows, size_t capacity) {
+  if (screen == nullptr) return 0;
+  const auto bones = screen->machine.bones(scene);
+  const size_t count = 12 * bones.size();
+  if (rows != nullptr && count > 0)
+    std::copy_n(glm::value_ptr(bones[0][0]), std::min(count, capacity), rows);
+  return count;
+}
+
 size_t modar_screen_items(modar_screen* screen, uint32_t pattern, const float view[16],
                           modar_item* items, size_t capacity) {
   if (screen == nullptr || view == nullptr || capacity == 0 || !modar::usable(view, 16)) return 0;
@@ -304,6 +343,7 @@ size_t modar_screen_items(modar_screen* screen, uint32_t pattern, const float vi
     item.scene = ours.scene + 1;
     modar::copy_matrix(ours.world_to_eye, item.world_to_eye);
     item.node = ours.node + 1;
+    if (ours.bones != nullptr) item.bones = glm::value_ptr((*ours.bones)[0]);
     auto* to = reinterpret_cast<modar_item*>(reinterpret_cast<char*>(items) + i * stride);
     to->size = stride;
     modar::give(item, to);

@@ -23,17 +23,15 @@ constexpr double kTiltDegrees = 20;  ///< seen from a little above, as an object
 
 /// The ball round the origin that holds the model's chunks (model space).
 double radius_of(const BundleView& bundle, std::uint32_t model) {
-  const ModelRecord& record = bundle.models()[model];
   double radius = 1e-3;
-  for (std::uint32_t i = 0; i < record.chunk_count; ++i) {
-    const ChunkRecord& chunk = bundle.chunks()[record.first_chunk + i];
+  visit_boxes(bundle, bundle.models()[model], [&](const auto& least, const auto& greatest) {
     glm::dvec3 far_corner(0.0);
     for (int axis = 0; axis < 3; ++axis) {
-      far_corner[axis] = std::max(std::abs(static_cast<double>(chunk.bounds_min[axis])),
-                                  std::abs(static_cast<double>(chunk.bounds_max[axis])));
+      far_corner[axis] = std::max(std::abs(static_cast<double>(least[axis])),
+                                  std::abs(static_cast<double>(greatest[axis])));
     }
     radius = std::max(radius, glm::length(far_corner));
-  }
+  });
   return radius;
 }
 

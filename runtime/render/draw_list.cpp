@@ -146,18 +146,51 @@ std::uint32_t choose_proxy(const BundleView& bundle, const ModelView& view, std:
 void DrawList::build(const BundleView& bundle, std::span<const ChunkSetup> setups,
                      const glm::mat4& projection, int height, std::span<const DrawItem> items,
                      float lod_pixels) {
+  begin(bundle, projection, height, items);
+  const Request request{bundle, setups, items, lod_pixels};
+  for (std::uint32_t i = 0; i < items.size(); ++i) {
+    if (items[i].model < bundle.models().size()) add_item(request, i);
+  }
+}
+
+void DrawList::begin(const BundleView& bundle, const glm::mat4& projection, int height,
+                     std::span<const DrawItem> items) {
   commands_.clear();
   views_.clear();
   culled_ = 0;
-  const Request request{bundle, setups, items, lod_pixels};
   for (std::uint32_t i = 0; i < items.size(); ++i) {
-    if (items[i].model >= bundle.models().size()) {
-      views_.push_back({});
-      continue;
-    }
-    views_.push_back(model_view(projection, items[i].to_eye, height));
-    add_item(request, i);
+    const bool drawn = items[i].model < bundle.models().size() || i >= whole_;
+    views_.push_back(drawn ? model_view(projection, items[i].to_eye, height) : ModelView{});
   }
+}
+
+std::span<const DrawItem> DrawList::pose(const BundleView& bundle,
+                                         std::span<const DrawItem> items) {
+  whole_ = items.size();
+  const auto rests = [&](const DrawItem& item) {
+    return item.bones == nullptr || item.model >= bundle.models().size();
+  };
+  if (bundle.moving_parts().empty() || std::all_of(items.begin(), items.end(), rests)) return items;
+  posed_.assign(items.begin(), items.end());
+  first_parts_.clear();
+  for (const DrawItem& item : items) {
+    first_parts_.push_back(0);
+    if (rests(item)) continue;
+    const RecordRange parts = parts_of(bundle, item.model);
+    const std::uint32_t first_bone = bones_of(bundle, item.model).first;
+    first_parts_.back() = static_cast<std::uint32_t>(posed_.size()) - parts.first;
+    for (std::uint32_t p = parts.first; p < parts.first + parts.count; ++p) {
+      const PartRecord& part = bundle.moving_parts()[p];
+      posed_.push_back(item);
+      DrawItem& moved = posed_.back();
+      moved.model = moved.node = kNone;
+      moved.bones += part.first_bone - first_bone;
+      if (part.bone_count > 1) continue;
+      moved.to_eye = item.to_eye * glm::transpose(glm::mat4(*moved.bones));
+      moved.bones = nullptr;
+    }
+  }
+  return posed_;
 }
 
 /// All chunks of the model, or of a proxy: never some of both, whose borders do not meet.
@@ -187,14 +220,10 @@ void DrawList::add_item(const Request& request, std::uint32_t item) {
 void DrawList::build_of(const GeometryStore& geometry, const BundleView& bundle,
                         std::span<const ChunkSetup> setups, const glm::mat4& projection, int height,
                         std::span<const DrawItem> items, float lod_pixels) {
-  commands_.clear();
-  culled_ = 0;
+  begin(bundle, projection, height, items);
   const Request request{bundle, setups, items, lod_pixels};
-  views_.clear();
   for (std::uint32_t i = 0; i < items.size(); ++i) {
-    const bool drawn = items[i].model < bundle.models().size();
-    views_.push_back(drawn ? model_view(projection, items[i].to_eye, height) : ModelView{});
-    if (drawn) add_there(request, i, geometry);
+    if (items[i].model < bundle.models().size()) add_there(request, i, geometry);
   }
 }
 
@@ -233,15 +262,29 @@ bool DrawList::use_there(const BundleView& bundle, std::size_t first,
   return true;
 }
 
+ChunkRecord boxed(const ChunkRecord& chunk, const PartRecord& part) {
+  ChunkRecord moved = chunk;
+  std::copy_n(part.bounds_min, 3, moved.bounds_min);
+  std::copy_n(part.bounds_max, 3, moved.bounds_max);
+  moved.cone_cutoff = 2.0f;
+  return moved;
+}
+
 /// Adds the visible chunks of a group; answers how many are not.
 int DrawList::add_group(const Request& request, std::uint32_t item, std::uint32_t number) {
   const BundleView& bundle = request.bundle;
   const ChunkGroup group = bundle.chunk_group(number);
-  const ModelView& view = views_[item];
+  const bool moves = request.items[item].bones != nullptr && whole_ < request.items.size();
   const Table<LevelRecord> levels = bundle.levels();
   int culled = 0;
   for (std::uint32_t c = group.first_chunk; c < group.first_chunk + group.chunk_count; ++c) {
-    const ChunkRecord& chunk = bundle.chunks()[c];
+    const std::uint32_t part = moves ? request.setups[c].part : kNone;
+    const std::uint32_t drawn = part == kNone ? item : first_parts_[item] + part;
+    const bool skinned = part != kNone && request.items[drawn].bones != nullptr;
+    const ModelView& view = views_[drawn];
+    const ChunkRecord& rest = bundle.chunks()[c];
+    ChunkRecord box;
+    const ChunkRecord& chunk = skinned ? (box = boxed(rest, bundle.moving_parts()[part])) : rest;
     const MaterialRecord& material = bundle.materials()[chunk.material];
     const bool two_sided = (material.flags & kMaterialTwoSided) != 0;
     if (outside_frustum(view, chunk) || (!two_sided && faces_away(view, chunk))) {
@@ -249,10 +292,10 @@ int DrawList::add_group(const Request& request, std::uint32_t item, std::uint32_
       continue;
     }
     DrawCommand command;
-    command.item = item;
+    command.item = drawn;
     command.chunk = c;
     command.level = chunk.first_level + choose_level(view, chunk, levels, request.lod_pixels);
-    command.program = request.setups[c].program;
+    command.program = skinned ? request.setups[c].skinned : request.setups[c].program;
     command.texture = material.texture;
     command.material = request.setups[c].material;
     // A matrix with a NaN must not upset the order.
@@ -347,11 +390,8 @@ DepthRange depth_range(const BundleView& bundle, std::span<const DrawItem> items
     const glm::dmat4 to_eye(item.to_eye);
     if (is_picture(bundle, item.node)) add_box(to_eye, {-1, -1, 0}, {1, 1, 0}, depths);
     if (item.model >= bundle.models().size()) continue;
-    const ModelRecord& model = bundle.models()[item.model];
-    for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
-      const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
-      add_box(to_eye, chunk.bounds_min, chunk.bounds_max, depths);
-    }
+    visit_boxes(bundle, bundle.models()[item.model],
+                [&](const auto& least, const auto& most) { add_box(to_eye, least, most, depths); });
   }
   if (!(depths.farthest > 0.0) || !std::isfinite(depths.farthest)) return {};
   DepthRange range;

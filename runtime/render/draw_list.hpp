@@ -50,6 +50,10 @@ float eye_distance(const ModelView& view, const ChunkRecord& chunk);
 std::uint32_t choose_level(const ModelView& view, const ChunkRecord& chunk,
                            const Table<LevelRecord>& levels, float pixels);
 
+/// The chunk with its part's box, which holds it in every pose of the clips, and never culled by
+/// its cone.
+ChunkRecord boxed(const ChunkRecord& chunk, const PartRecord& part);
+
 /// The coarsest proxy of a model whose error is at most `pixels` on the screen, as a chunk group
 /// of the bundle; kNone: none exists.
 std::uint32_t choose_proxy(const BundleView& bundle, const ModelView& view, std::uint32_t model,
@@ -70,6 +74,8 @@ struct DrawCommand {
 /// What a chunk needs from the renderer's set-up.
 struct ChunkSetup {
   std::uint32_t program = 0;
+  std::uint32_t skinned = 0;   ///< the program that turns vertices with the part's bones
+  std::uint32_t part = kNone;  ///< moving part of the bundle
   std::uint32_t material = 0;  ///< the first one of its values
   bool hides = false;
   bool blended = false;
@@ -77,6 +83,9 @@ struct ChunkSetup {
 
 class DrawList {
  public:
+  /// The items, and behind them the moving parts of those that have bones: a part of one bone with
+  /// its matrix, a skinned one with its bones. build() takes that; it lives until the next call.
+  std::span<const DrawItem> pose(const BundleView& bundle, std::span<const DrawItem> items);
   /// Collects visible chunks: of each item its model's chunks, or a proxy where that is less to
   /// draw. setups: one a chunk of the bundle. Keeps its memory from call to call.
   void build(const BundleView& bundle, std::span<const ChunkSetup> setups,
@@ -108,12 +117,17 @@ class DrawList {
     std::span<const DrawItem> items;
     float lod_pixels = 0.0f;
   };
+  void begin(const BundleView& bundle, const glm::mat4& projection, int height,
+             std::span<const DrawItem> items);
   void add_item(const Request& request, std::uint32_t item);
   void add_there(const Request& request, std::uint32_t item, const GeometryStore& geometry);
   bool use_there(const BundleView& bundle, std::size_t first, const GeometryStore& geometry);
   int add_group(const Request& request, std::uint32_t item, std::uint32_t group);
   std::vector<DrawCommand> commands_;
   std::vector<ModelView> views_;  ///< one an item
+  std::vector<DrawItem> posed_;
+  std::vector<std::uint32_t> first_parts_;  ///< of an item: in posed_, less its model's first one
+  std::size_t whole_ = ~std::size_t{0};     ///< items before the parts
   int culled_ = 0;
 };
 

@@ -18,8 +18,9 @@ enum AttributeSlot : GLuint {
   kAttributeNormal = 1,
   kAttributeUv = 2,
   kAttributeColour = 3,
-  kAttributeSlot = 4,  ///< the vertex's own choice of a slot
-  kAttributeRows = 5,  ///< the first of three rows that step once an instance
+  kAttributeSlot = 4,    ///< the vertex's own choice of a slot
+  kAttributeRows = 5,    ///< the first of three rows that step once an instance
+  kAttributeJoints = 5,  ///< and weights behind it, of vertices that bones turn: no instances
   kAttributeCount = 8,
 };
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -111,7 +112,14 @@ void LightList::build(const BundleView& bundle, std::span<const DrawItem> items,
   light_strength_ = options.light_strength;
   lights_.clear();
   of_item_.clear();
+  const DrawItem* before = nullptr;
   for (const DrawItem& item : items) {
+    const DrawItem* last = std::exchange(before, &item);
+    // Moving parts follow each other.
+    if (last != nullptr && last->scene == item.scene && last->world_to_eye == item.world_to_eye) {
+      of_item_.push_back(of_item_.back());
+      continue;
+    }
     RoomLight light = options.light ? *options.light : scene_light(bundle, item.scene);
     if (estimator != nullptr) {
       if (const auto gain = estimator->at_model(item.scene)) light = scaled_light(light, *gain);

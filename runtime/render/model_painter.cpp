@@ -14,6 +14,8 @@
 namespace modar {
 namespace {
 
+constexpr std::uint32_t kSkinAttributes = 3u << kAttributeJoints;
+
 /// Copies that one call draws at most; 59 fit into the uniforms that every ES 3 has.
 constexpr int kMostSlots = 64;
 
@@ -148,6 +150,11 @@ Result<void> ModelPainter::create(const TextureStore& textures, const GlExtensio
       key.shiny = shines(material) || glows(material) || mirrors(material);
       MODAR_ASSIGN(const std::uint32_t program, program_of(key));
       setups_[c].program = program;
+      setups_[c].part = part_of(bundle_, bundle_.chunks()[c].material);
+      if (setups_[c].part != kNone && bundle_.moving_parts()[setups_[c].part].bone_count > 1) {
+        key.skinned = true;
+        MODAR_ASSIGN(setups_[c].skinned, program_of(key));
+      }
       setups_[c].material = equal_material_[bundle_.chunks()[c].material];
       setups_[c].hides = (material.flags & kMaterialOccluder) != 0;
       setups_[c].blended =
@@ -180,7 +187,7 @@ ModelPainter::ProgramState* ModelPainter::program(std::uint32_t index, SlotKind 
   if (state.program.id != 0) return &state;
   ProgramKey key = set.by_slots[0].program.key;
   key.slots = slots;
-  key.slot_count = slots == SlotKind::kStream ? slot_count_ : 1;
+  key.slot_count = slots == SlotKind::kStream && !key.skinned ? slot_count_ : 1;
   const Result<ModelProgram> linked = make_model_program(key);
   gl.forget_program();
   set.failed[kind] = !linked.has_value();
@@ -290,7 +297,15 @@ void ModelPainter::set_slot(const PaintJob& job, ProgramState& state, const Piec
   if (state.item == piece.item && same_decoding(state.chunk, piece.chunk)) return;
   state.item = piece.item;
   state.chunk = piece.chunk;
-  const ChunkRecord& chunk = bundle_.chunks()[piece.chunk];
+  ChunkRecord decoded;
+  const bool skinned = state.program.key.skinned;
+  if (skinned) {
+    set_bones(job, state, piece);
+    decoded = bundle_.chunks()[piece.chunk];
+    std::fill_n(decoded.position_offset, 3, 0.0f);
+    decoded.position_step = 1.0f;
+  }
+  const ChunkRecord& chunk = skinned ? decoded : bundle_.chunks()[piece.chunk];
   if (state.program.to_clip < 0) {
     const Slot slot = make_slot(matrix(job, piece), chunk);
     glUniform4fv(state.program.slots, 4, glm::value_ptr(slot[0]));
@@ -311,14 +326,28 @@ void ModelPainter::set_slot(const PaintJob& job, ProgramState& state, const Piec
   set_vector(state.program.uv_map, uv_map, job.stats);
 }
 
+void ModelPainter::set_bones(const PaintJob& job, const ProgramState& state, const Piece& piece) {
+  const ChunkRecord& chunk = bundle_.chunks()[piece.chunk];
+  const std::uint32_t bones = bundle_.moving_parts()[setups_[piece.chunk].part].bone_count;
+  glUniform4fv(state.program.bones, static_cast<GLsizei>(3 * bones),
+               glm::value_ptr((*job.items[piece.item].bones)[0]));
+  job.stats.bytes_uploaded += bones * sizeof(BoneMatrix);
+  set_vector(state.program.decode,
+             {chunk.position_offset[0], chunk.position_offset[1], chunk.position_offset[2],
+              chunk.position_step},
+             job.stats);
+}
+
 void ModelPainter::set_attributes(std::uint32_t layout, GLuint buffer, std::uintptr_t offset,
                                   std::uint32_t more, GlState& gl) const {
   const VertexFormat& format = formats_[layout];
-  for (GLuint i = 0; i < format.attributes.size(); ++i) {
+  const bool skinned = more == kSkinAttributes;
+  for (GLuint i = 0; i < (skinned ? format.attributes.size() : kFormatJoints); ++i) {
     const VertexAttribute& attribute = format.attributes[i];
     if (attribute.components == 0) continue;
-    gl.set_attribute(i, {buffer, attribute.components, attribute.type, attribute.normalised,
-                         static_cast<GLsizei>(format.stride), offset + attribute.offset});
+    const GLuint location = i < kFormatJoints ? i : i - kFormatJoints + kAttributeJoints;
+    gl.set_attribute(location, {buffer, attribute.components, attribute.type, attribute.normalised,
+                                static_cast<GLsizei>(format.stride), offset + attribute.offset});
   }
   gl.enable_attributes(format.enabled | more);
 }
@@ -401,7 +430,7 @@ bool ModelPainter::continues(const Piece& piece, const DrawCommand& next) const 
 
 void ModelPainter::draw_group(const PaintJob& job, std::span<Piece> group) {
   const bool several_items = group.front().item != group.back().item;
-  if (!several_items || !job.options.instancing) {
+  if (!several_items || !job.options.instancing || skinned(group.front())) {
     for (const Piece& piece : group) draw_piece(job, piece);
     return;
   }
@@ -439,7 +468,12 @@ void ModelPainter::draw_piece(const PaintJob& job, const Piece& piece) {
   ProgramState& state = single_state(job, piece);
   set_surface(job, state, piece);
   set_slot(job, state, piece);
-  set_attributes(piece.layout, place.vertex_buffer, place.vertex_offset, 0, job.gl);
+  const bool bends = skinned(piece);
+  // Rows of instances may have been there.
+  for (GLuint i = 0; i < 2 && bends && extensions_.instancing(); ++i)
+    extensions_.vertex_attrib_divisor(kAttributeJoints + i, 0);
+  set_attributes(piece.layout, place.vertex_buffer, place.vertex_offset,
+                 bends ? kSkinAttributes : 0, job.gl);
   const auto order = order_of(piece.chunk, piece.mesh.level);
   const bool ordered = !order.empty() && job.list.view(piece.item).perspective;
   if (ordered) {

@@ -7,6 +7,7 @@
 
 #include "formats/component.hpp"
 #include "modar/renderer.hpp"
+#include "runtime/render/draw_list.hpp"
 
 namespace modar {
 namespace {
@@ -61,9 +62,32 @@ double meet_square(const Ray& ray, double nearest) {
   return met ? std::min(nearest, steps) : nearest;
 }
 
+/// A vertex of the rest pose where bones turn it; without attributes, the first one turns all.
+glm::dvec3 turned(const LayoutRecord& layout, const std::byte* vertex, const PartRecord& part,
+                  const BoneMatrix* bones, const glm::dvec3& rest) {
+  const AttributeRecord* joints = find_attribute(layout, Semantic::kJoints);
+  const AttributeRecord* weights = find_attribute(layout, Semantic::kWeights);
+  const glm::dvec4 point(rest, 1.0);
+  if (part.bone_count == 1 || joints == nullptr || weights == nullptr)
+    return point * glm::dmat3x4(bones[0]);
+  glm::dvec3 sum(0.0);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    const auto bone = static_cast<std::uint32_t>(decode_component(*joints, vertex, i));
+    if (bone >= part.bone_count) continue;
+    sum += decode_component(*weights, vertex, i) * (point * glm::dmat3x4(bones[bone]));
+  }
+  return sum;
+}
+
 /// Steps to the chunk's nearest triangle, or `nearest`.
-double meet_chunk(const BundleView& bundle, const LayoutRecord& layout, const ChunkRecord& chunk,
+double meet_chunk(const BundleView& bundle, const DrawItem& item, const ChunkRecord& rest,
                   const Ray& ray, double nearest) {
+  const LayoutRecord& layout = bundle.layouts()[bundle.models()[item.model].layout];
+  const std::uint32_t number = item.bones == nullptr ? kNone : part_of(bundle, rest.material);
+  const PartRecord* part = number == kNone ? nullptr : &bundle.moving_parts()[number];
+  const ChunkRecord chunk = part == nullptr ? rest : boxed(rest, *part);
+  const BoneMatrix* bones = item.bones;
+  if (part != nullptr) bones += part->first_bone - bones_of(bundle, item.model).first;
   const AttributeRecord* position = find_attribute(layout, Semantic::kPosition);
   const LevelRecord& level = bundle.levels()[chunk.first_level];
   if (position == nullptr || !meets_box(ray, chunk, nearest)) return nearest;
@@ -73,14 +97,14 @@ double meet_chunk(const BundleView& bundle, const LayoutRecord& layout, const Ch
     const std::size_t index = load_number<std::uint16_t>(indices + 2 * i);
     // Payloads are bounded, not read, by BundleView::open().
     if (index >= level.vertex_count) return glm::dvec3(std::numeric_limits<double>::quiet_NaN());
+    const std::byte* vertex = vertices + index * layout.stride;
     glm::dvec3 point;
     for (std::uint32_t axis = 0; axis < 3; ++axis) {
       point[static_cast<int>(axis)] =
           static_cast<double>(chunk.position_offset[axis]) +
-          static_cast<double>(chunk.position_step) *
-              decode_component(*position, vertices + index * layout.stride, axis);
+          static_cast<double>(chunk.position_step) * decode_component(*position, vertex, axis);
     }
-    return point;
+    return part == nullptr ? point : turned(layout, vertex, *part, bones, point);
   };
   for (std::size_t i = 0; i + 2 < level.index_count; i += 3) {
     nearest = std::min(nearest, meet_triangle(ray, {corner(i), corner(i + 1), corner(i + 2)}));
@@ -109,7 +133,7 @@ std::optional<Pick> pick(const BundleView& bundle, const Camera& camera, glm::dv
     for (std::uint32_t c = model.first_chunk; c < model.first_chunk + model.chunk_count; ++c) {
       const double before = met;
       const ChunkRecord& chunk = bundle.chunks()[c];
-      met = meet_chunk(bundle, bundle.layouts()[model.layout], chunk, ray, met);
+      met = meet_chunk(bundle, items[i], chunk, ray, met);
       if (met < before) material = chunk.material;
     }
     if (!(met < nearest)) continue;

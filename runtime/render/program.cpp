@@ -66,6 +66,8 @@ void name_attributes(GLuint program) {
   glBindAttribLocation(program, kAttributeRows, "a_row0");
   glBindAttribLocation(program, kAttributeRows + 1, "a_row1");
   glBindAttribLocation(program, kAttributeRows + 2, "a_row2");
+  glBindAttribLocation(program, kAttributeJoints, "a_joints");
+  glBindAttribLocation(program, kAttributeJoints + 1, "a_weights");
 }
 
 std::string model_defines(const ProgramKey& key) {
@@ -78,6 +80,7 @@ std::string model_defines(const ProgramKey& key) {
   if (key.cut_out) define("CUT_OUT");
   if (key.coloured) define("COLOURED");
   if (key.shiny) define("SHINY");
+  if (key.skinned) define("SKINNED");
   if (key.slots == SlotKind::kAttributes) define("SLOT_ATTRIBUTES");
   if (key.slots == SlotKind::kStream) {
     char digits[12] = "";
@@ -127,6 +130,8 @@ Result<ModelProgram> make_model_program(const ProgramKey& key) {
   program.to_clip = place("u_to_clip");
   program.uv_map = place("u_uv_map");
   program.eye = place("u_eye");
+  program.bones = place("u_bones");
+  program.decode = place("u_decode");
   program.sky = place("u_sky");
   program.to_key = place("u_key");
   program.key_colour = place("u_key_colour");

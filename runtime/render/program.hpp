@@ -21,8 +21,9 @@ struct ProgramKey {
   bool alpha_twin = false;
   bool cut_out = false;  ///< drawn where the twin's alpha is 1/2 and more, and opaque there
   bool coloured = false;
-  bool shiny = false;  ///< has a highlight or emission, or mirrors
-  int slot_count = 1;  ///< of kStream
+  bool shiny = false;    ///< has a highlight or emission, or mirrors
+  bool skinned = false;  ///< bones turn its vertices
+  int slot_count = 1;    ///< of kStream
   bool operator==(const ProgramKey&) const = default;
 };
 
@@ -35,6 +36,8 @@ struct ModelProgram {
   GLint to_clip = -1;  ///< of kSingle, and the next two
   GLint uv_map = -1;
   GLint eye = -1;
+  GLint bones = -1;  ///< of skinned, and the next one
+  GLint decode = -1;
   GLint sky = -1;
   GLint to_key = -1;  ///< direction of the key light
   GLint key_colour = -1;

@@ -228,7 +228,8 @@ struct Renderer::State {
       ground.draw_shadows(bundle, projection, items, gl, stats);
     }
     const DebugGroup group(extensions, "models");
-    build_list(projection, height, items);
+    const std::span<const DrawItem> posed = list.pose(bundle, items);
+    build_list(projection, height, posed);
     stats.chunks_culled = list.culled();
     if (geometry.streams()) {
       list.sort_by_distance();
@@ -240,7 +241,7 @@ struct Renderer::State {
     planes.choose(pictures, false);
     planes.draw(pictures, nullptr);
     planes.choose(pictures, true);
-    painter.draw({list, items, projection, options, geometry, textures, gl, stats, planes, pictures,
+    painter.draw({list, posed, projection, options, geometry, textures, gl, stats, planes, pictures,
                   options.estimate_light ? &estimator : nullptr});
     planes.draw(pictures, nullptr);
     gl.set_depth_writes(true);  // clearing obeys the masks
@@ -317,16 +318,22 @@ struct Renderer::State {
     }
     const std::size_t listed = levels.size();
     for (std::uint32_t i = 0; i < items.size(); ++i) {
+      if (items[i].model == kNone) continue;
       const auto is_own = [&](const DrawCommand& command) {
         return command.item == i && command.chunk < bundle.chunks().own().size();
       };
       // A proxy is there as a whole.
-      if (std::none_of(list.commands().begin(), list.commands().end(), is_own)) continue;
+      const bool poses = items[i].bones != nullptr;  // and has no proxy
+      if (!poses && std::none_of(list.commands().begin(), list.commands().end(), is_own)) continue;
       const ModelView view = model_view(wide, items[i].to_eye, height);
       const ModelRecord& model = bundle.models()[items[i].model];
       for (std::uint32_t c = model.first_chunk; c < model.first_chunk + model.chunk_count; ++c) {
         const ChunkRecord& chunk = bundle.chunks()[c];
-        if (outside_frustum(view, chunk) || some_there(chunk)) continue;
+        const std::uint32_t part = poses ? painter.setups()[c].part : kNone;
+        const bool outside = part == kNone
+                                 ? outside_frustum(view, chunk)
+                                 : outside_frustum(view, boxed(chunk, bundle.moving_parts()[part]));
+        if (outside || some_there(chunk)) continue;
         levels.push_back(chunk.first_level + chunk.level_count - 1);
       }
     }

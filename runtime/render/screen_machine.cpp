@@ -42,6 +42,13 @@ int hint_for(int reason, double unseen) {
 
 }  // namespace
 
+ScreenMachine::ScreenMachine(const BundleView& bundle) : bundle_(bundle), actions_(bundle) {
+  if (bundle.moving_parts().empty()) return;
+  for (const SceneRecord& scene : bundle.scenes()) {
+    motions_.push_back({ClipPlayer(bundle, scene.model)});
+  }
+}
+
 int ScreenMachine::touch(const modar_touch& touch) {
   const auto has = [&touch](const Finger& each) {
     return each.down && each.number == touch.finger;
@@ -104,6 +111,10 @@ void ScreenMachine::limit() {
 /// Switches stay as the visitor has set them.
 void ScreenMachine::reset() {
   actions_.reset();
+  for (Motion& motion : motions_) {
+    motion.player.reset();
+    motion.begun = motion.seen = false;
+  }
   turntable_ = start();
   fingers_ = {};
   tap_ = presents_ = false;
@@ -144,7 +155,60 @@ std::span<const SceneCommand> ScreenMachine::step(double time_s,
     return command.command == ActionCommand::kPlay;
   });
   if (tapped && plays && !asked_) press(MODAR_SOUND, 1);
+  if (!motions_.empty()) step_clips(time_s, events);
   return commands;
+}
+
+bool ScreenMachine::shows(const SceneEvent& event, std::uint32_t scene) const {
+  const std::uint32_t baked = bundle_.patterns().size();
+  if (event.kind != SceneEvent::Kind::kSeen) return false;
+  if (event.subject < baked) return bundle_.scenes()[scene].pattern == event.subject;
+  return event.subject - baked < own_.size() && own_[event.subject - baked] == scene;
+}
+
+void ScreenMachine::step_clips(double time_s, std::span<const SceneEvent> events) {
+  const double seconds = time_s - std::exchange(clip_time_, time_s);
+  for (std::uint32_t scene = 0; scene < motions_.size(); ++scene) {
+    Motion& motion = motions_[scene];
+    if (status_.paused == 0) motion.player.advance(seconds);
+    motion.seen = std::any_of(events.begin(), events.end(),
+                              [&](const SceneEvent& event) { return shows(event, scene); });
+    if (!motion.seen) continue;
+    if (!std::exchange(motion.begun, true)) begin_clip(scene);
+    motion.player.pose();
+  }
+}
+
+/// An app may have begun another one before.
+void ScreenMachine::begin_clip(std::uint32_t scene) {
+  for (const SceneClipRecord& clip : bundle_.scene_clips()) {
+    if (clip.scene == scene && motions_[scene].player.bones().empty())
+      play(scene, clip.clip, (clip.flags & kSceneClipLoops) != 0, 0);
+  }
+}
+
+bool ScreenMachine::play(std::uint32_t scene, std::uint32_t clip, bool loops, double blend_s) {
+  return scene < motions_.size() && motions_[scene].player.play(clip, loops, blend_s);
+}
+
+void ScreenMachine::stop(std::uint32_t scene) {
+  if (scene < motions_.size()) motions_[scene].player.stop();
+}
+
+std::uint32_t ScreenMachine::playing(std::uint32_t scene) const {
+  return scene < motions_.size() ? motions_[scene].player.playing() : kNone;
+}
+
+std::span<const BoneMatrix> ScreenMachine::bones(std::uint32_t scene) const {
+  if (scene >= motions_.size()) return {};
+  return motions_[scene].player.bones();
+}
+
+bool ScreenMachine::waiting() const {
+  const auto moves = [this](const Motion& motion) {
+    return motion.seen && status_.paused == 0 && motion.player.moves();
+  };
+  return presents_ || actions_.waiting() || std::any_of(motions_.begin(), motions_.end(), moves);
 }
 
 /// Once around, slower towards the end.
@@ -168,6 +232,7 @@ void ScreenMachine::add_items(std::uint32_t pattern, const glm::mat4& view,
     const SceneRecord& record = bundle_.scenes()[scene];
     items.push_back({record.model, scene_matrix(record), scene, {}});
   }
+  for (DrawItem& item : std::span(items).subspan(first)) item.bones = bones(item.scene).data();
   place(view, std::span(items).subspan(first));
 }
 

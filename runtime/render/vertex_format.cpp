@@ -26,8 +26,9 @@ GLenum gl_type(ComponentType type, GLenum half_type) {
   return GL_FLOAT;
 }
 
-/// kAttributeCount where a model shader has no such attribute.
-std::uint32_t location_of(Semantic semantic) {
+/// The place in VertexFormat::attributes; kAttributeCount where a model shader has no such
+/// attribute.
+std::uint32_t place_of(Semantic semantic) {
   switch (semantic) {
     case Semantic::kPosition:
       return kAttributePosition;
@@ -39,8 +40,9 @@ std::uint32_t location_of(Semantic semantic) {
     case Semantic::kColour:
       return kAttributeColour;
     case Semantic::kJoints:
+      return kFormatJoints;
     case Semantic::kWeights:
-      break;
+      return kFormatJoints + 1;
   }
   return kAttributeCount;
 }
@@ -70,11 +72,11 @@ VertexFormat vertex_format(const LayoutRecord& layout, GLenum half_type, std::ui
   for (std::uint32_t i = 0; i < layout.attribute_count; ++i) {
     const AttributeRecord& record = layout.attributes[i];
     const Semantic semantic = static_cast<Semantic>(record.semantic);
-    const std::uint32_t location = location_of(semantic);
-    if (location >= format.attributes.size()) continue;
+    const std::uint32_t place = place_of(semantic);
+    if (place >= format.attributes.size()) continue;
     const ComponentType type = static_cast<ComponentType>(record.type);
     const bool widen = format.widened && type == ComponentType::kHalf;
-    VertexAttribute& attribute = format.attributes[location];
+    VertexAttribute& attribute = format.attributes[place];
     attribute.components = record.components;
     attribute.type = widen ? GLenum{GL_FLOAT} : gl_type(type, half_type);
     attribute.normalised = record.normalised != 0 ? GLboolean{GL_TRUE} : GLboolean{GL_FALSE};
@@ -95,7 +97,7 @@ VertexFormat vertex_format(const LayoutRecord& layout, GLenum half_type, std::ui
     attribute.offset = format.widened ? end : record.offset;
     // Attributes of a rewritten vertex start at multiples of 4, which every GPU reads fastest.
     end += ((widen ? 2 * attribute.bytes : attribute.bytes) + 3) & ~3u;
-    format.enabled |= 1u << location;
+    if (place < kFormatJoints) format.enabled |= 1u << place;
     if (semantic == Semantic::kNormal) format.normal = NormalKind::kXyz;
     if (semantic == Semantic::kNormalOct) format.normal = NormalKind::kOctahedral;
   }

@@ -21,14 +21,16 @@ struct VertexAttribute {
   std::uint32_t bytes = 0;          ///< as the bundle has it
 };
 
-/// Indexed by AttributeSlot: position, normal, uv, colour.
+inline constexpr std::uint32_t kFormatJoints = 4;
+
+/// Indexed by AttributeSlot: position, normal, uv, colour; then joints and weights.
 struct VertexFormat {
-  std::array<VertexAttribute, 4> attributes{};
+  std::array<VertexAttribute, 6> attributes{};
   NormalKind normal = NormalKind::kAbsent;
   std::uint32_t source_stride = 0;
   std::uint32_t stride = 0;   ///< as uploaded
   bool widened = false;       ///< halves become floats
-  std::uint32_t enabled = 0;  ///< bit mask of AttributeSlot
+  std::uint32_t enabled = 0;  ///< bit mask of AttributeSlot, without joints and weights
 };
 
 /// half_type: what the context calls half floats; 0: it reads none. Attributes of unknown semantics

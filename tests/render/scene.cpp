@@ -99,6 +99,14 @@ std::uint32_t SceneMaker::add_layout(Layout layout) {
       set(attribute(Semantic::kPosition, ComponentType::kF32, 3, 0, 0));
       set(attribute(Semantic::kColour, ComponentType::kU8, 4, 1, 12));
       break;
+    case Layout::kF32Skinned:
+      record.stride = 28;
+      set(attribute(Semantic::kPosition, ComponentType::kF32, 3, 0, 0));
+      set(attribute(Semantic::kNormal, ComponentType::kI8, 3, 1, 12));
+      set(attribute(Semantic::kColour, ComponentType::kU8, 4, 1, 16));
+      set(attribute(Semantic::kJoints, ComponentType::kU8, 4, 0, 20));
+      set(attribute(Semantic::kWeights, ComponentType::kU8, 4, 1, 24));
+      break;
   }
   content.layouts.push_back(record);
   layouts_.push_back(layout);
@@ -146,7 +154,7 @@ void SceneMaker::append_vertex(std::uint32_t layout, const Triangle& triangle, s
   const glm::dvec3& p = triangle.corners[corner];
   const Layout kind = layouts_[layout];
   for (int axis = 0; axis < 3; ++axis) {
-    if (kind == Layout::kF32Coloured) {
+    if (kind == Layout::kF32Coloured || kind == Layout::kF32Skinned) {
       put(out, static_cast<float>(p[axis]));
     } else if (is_i16(kind)) {
       put(out, static_cast<std::int16_t>(std::lround(p[axis] * 512.0)));
@@ -154,15 +162,17 @@ void SceneMaker::append_vertex(std::uint32_t layout, const Triangle& triangle, s
       put(out, half_bits(p[axis]));
     }
   }
-  if (kind != Layout::kF32Coloured) put(out, std::uint16_t{0});
+  if (kind != Layout::kF32Coloured && kind != Layout::kF32Skinned) put(out, std::uint16_t{0});
   if (kind == Layout::kHalfTextured) {
     for (int axis = 0; axis < 2; ++axis) {
       put(out, static_cast<std::uint16_t>(std::lround(triangle.uvs[corner][axis] * 65535.0)));
     }
     return;
   }
-  if (kind == Layout::kHalfLit) {
-    for (int axis = 0; axis < 3; ++axis) put(out, snorm8(triangle.normal[axis]));
+  if (kind == Layout::kHalfLit || kind == Layout::kF32Skinned) {
+    const glm::dvec3& normal =
+        kind == Layout::kHalfLit ? triangle.normal : triangle.normals[corner];
+    for (int axis = 0; axis < 3; ++axis) put(out, snorm8(normal[axis]));
     put(out, std::int8_t{0});
   }
   if (kind == Layout::kOctLit || kind == Layout::kI16OctLit) {
@@ -178,6 +188,9 @@ void SceneMaker::append_vertex(std::uint32_t layout, const Triangle& triangle, s
   }
   for (const std::uint8_t channel : triangle.colour) put(out, channel);
   put(out, std::uint8_t{255});
+  if (kind != Layout::kF32Skinned) return;
+  for (const std::uint8_t joint : triangle.joints[corner]) put(out, joint);
+  for (const std::uint8_t weight : triangle.weights[corner]) put(out, weight);
 }
 
 std::uint32_t SceneMaker::add_model(std::uint32_t layout, const std::vector<Chunk>& chunks,

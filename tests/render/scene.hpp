@@ -30,6 +30,10 @@ struct Triangle {
   std::array<glm::dvec2, 3> uvs{};
   Rgb colour{255, 255, 255};
   glm::dvec3 normal{0.0, 0.0, 1.0};
+  /// Of the layout kF32Skinned: of each corner, its normal, bones and weights of 255.
+  std::array<glm::dvec3, 3> normals{};
+  std::array<std::array<std::uint8_t, 4>, 3> joints{};
+  std::array<std::array<std::uint8_t, 4>, 3> weights{{{255}, {255}, {255}}};
 };
 
 enum class Layout {
@@ -39,7 +43,8 @@ enum class Layout {
   kI16Coloured,
   kF32Coloured,
   kOctLit,
-  kI16OctLit
+  kI16OctLit,
+  kF32Skinned
 };
 
 /// Rounds a coordinate to one that half floats hold exactly in [-1,1].

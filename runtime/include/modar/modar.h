@@ -364,6 +364,7 @@ typedef struct modar_item {
   float opacity; /* 0 or 1: as baked; between: the background shows through, as through glass */
   uint32_t node; /* number of its node: its index + 1; 0: none. A picture is drawn in place of a
                     model, and to_eye takes the square from -1 to 1 of its plane z = 0 */
+  const float* bones; /* the model's pose, as modar_clip_bones(); NULL: as baked */
 } modar_item;
 /* to_eye = view * place, world_to_eye = view; the rest stays. */
 void modar_item_place(modar_item* item, const modar_scene* scene, const modar_pose* pose);
@@ -662,10 +663,38 @@ MODAR_EXPERIMENTAL int modar_screen_shown(const modar_screen* screen, uint32_t n
 /* 1: step and draw on, even if no frame comes: something turns, or a delay runs. */
 MODAR_EXPERIMENTAL int modar_screen_waiting(const modar_screen* screen);
 
+/* A movement of a model. One model's follow each other. */
+typedef struct modar_clip {
+  size_t size;
+  uint32_t model;
+  float seconds;
+} modar_clip;
+MODAR_EXPERIMENTAL uint32_t modar_clip_count(const modar_bundle* bundle);
+/* Returns 1 and the clip, or 0 for an invalid index. */
+MODAR_EXPERIMENTAL int modar_clip_at(const modar_bundle* bundle, uint32_t index, modar_clip* clip);
+/* Copies and returns as modar_pattern_name(). */
+MODAR_EXPERIMENTAL size_t modar_clip_name(const modar_bundle* bundle, uint32_t index, char* text,
+                                          size_t size);
+/* From the next step on, a scene's model plays a clip of its own from the beginning; within blend_s
+ * seconds (usually 0.3) its present pose turns into that. loops: 1: again and again; 0: its last
+ * pose stays. What the bundle says for a scene is played from when its pattern is found, unless a
+ * clip is playing then. Returns 1, or 0 and changes nothing. */
+MODAR_EXPERIMENTAL int modar_clip_play(modar_screen* screen, uint32_t scene, uint32_t clip,
+                                       int loops, double blend_s);
+/* The pose stays. */
+MODAR_EXPERIMENTAL void modar_clip_stop(modar_screen* screen, uint32_t scene);
+/* Number of the clip that moves a scene's model, its index + 1; 0: none does, or it has ended. */
+MODAR_EXPERIMENTAL uint32_t modar_clip_playing(const modar_screen* screen, uint32_t scene);
+/* The pose of a scene's model in the last step in which its pattern was seen: 12 floats a bone, the
+ * rows of a matrix from the model as it was baked to its pose. Copies at most `capacity` floats;
+ * returns how many there are, 0 before a clip was played. */
+MODAR_EXPERIMENTAL size_t modar_clip_bones(const modar_screen* screen, uint32_t scene, float* rows,
+                                           size_t capacity);
+
 /* What of a pattern is to be drawn: the models of its scenes and its pictures, without hidden
  * ones, turned as actions and the visitor say. view: modar_view() of its pose. items: `capacity` of
- * them, the first with its size set; as many as the bundle has scenes and nodes are enough. Returns
- * how many it filled. */
+ * them, the first with its size set; as many as the bundle has scenes and nodes are enough. Poses
+ * are the screen's, until its next step. Returns how many it filled. */
 MODAR_EXPERIMENTAL size_t modar_screen_items(modar_screen* screen, uint32_t pattern,
                                              const float view[16], modar_item* items,
                                              size_t capacity);

@@ -23,6 +23,7 @@
 #include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/camera.hpp"
+#include "modar/clip_player.hpp"
 #include "modar/gl_context.hpp"
 #include "modar/image.hpp"
 
@@ -40,6 +41,7 @@ struct DrawItem {
   float opacity = 1.0f;  ///< factor on that of its materials; below 1, the background shows through
   std::uint32_t node = kNone;  ///< whose item it is. Of a picture: it is drawn in place of a model,
                                ///< to_eye takes the square [-1,1] of z = 0 to eye space
+  const BoneMatrix* bones = nullptr;  ///< of the model: ClipPlayer::bones(); null: the rest pose
 };
 
 /// Light in a space whose z points up to the ceiling. Linear; 1: a white surface in this light is

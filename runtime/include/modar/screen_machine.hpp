@@ -16,7 +16,7 @@ namespace modar {
 class ScreenMachine {
  public:
   /// bundle: opened; its bytes outlive the machine.
-  explicit ScreenMachine(const BundleView& bundle) : bundle_(bundle), actions_(bundle) {}
+  explicit ScreenMachine(const BundleView& bundle);
   /// What the visitor has chosen with a machine of another version of the bundle.
   void inherit(const ScreenMachine& before) {
     turntable_ = before.turntable_;
@@ -33,8 +33,16 @@ class ScreenMachine {
   modar_turntable turntable(double time_s);
   [[nodiscard]] const modar_status& status() const { return status_; }
   std::span<const SceneCommand> step(double time_s, std::span<const SceneEvent> events);
-  [[nodiscard]] bool waiting() const { return presents_ || actions_.waiting(); }
+  [[nodiscard]] bool waiting() const;
   [[nodiscard]] bool shown(std::uint32_t node) const { return actions_.shown(node); }
+
+  /// Of a scene of the bundle; false for a clip that is not of its model.
+  bool play(std::uint32_t scene, std::uint32_t clip, bool loops, double blend_s);
+  void stop(std::uint32_t scene);
+  /// The clip that moves a scene's model, or kNone.
+  [[nodiscard]] std::uint32_t playing(std::uint32_t scene) const;
+  /// As ClipPlayer::bones(), at the time of the last step.
+  [[nodiscard]] std::span<const BoneMatrix> bones(std::uint32_t scene) const;
 
   void add_pattern(std::uint32_t scene) { own_.push_back(scene); }
   void forget_patterns() { own_.clear(); }
@@ -52,11 +60,23 @@ class ScreenMachine {
     double y = 0;
   };
 
+  /// The clip of a scene's model.
+  struct Motion {
+    ClipPlayer player;
+    bool begun = false;  ///< its pattern was seen
+    bool seen = false;   ///< in the last step
+  };
+
   void limit();
+  void step_clips(double time_s, std::span<const SceneEvent> events);
+  void begin_clip(std::uint32_t scene);
+  [[nodiscard]] bool shows(const SceneEvent& event, std::uint32_t scene) const;
 
   BundleView bundle_;
   ActionMachine actions_;
   std::vector<std::uint32_t> own_;  ///< scenes of further patterns
+  std::vector<Motion> motions_;     ///< one a scene; none at all where nothing moves
+  double clip_time_ = 0;            ///< seconds: the last step's
   modar_turntable turntable_ = start();
   modar_status status_{sizeof status_, MODAR_STATE_START, MODAR_HINT_LOOK, 0, 0, 0, 1};
   std::array<Finger, 2> fingers_;

@@ -1,0 +1,97 @@
+// A model in motion: the matrices of its bones at a time of a clip, or between two clips.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/mat3x4.hpp>
+
+#include "formats/bundle_view.hpp"
+
+namespace modar {
+
+/// Three rows: from the rest pose in model space to the pose. GLM calls them columns.
+using BoneMatrix = glm::mat3x4;
+
+/// The moving part of a material, or kNone.
+std::uint32_t part_of(const BundleView& bundle, std::uint32_t material);
+
+/// A run of records.
+struct RecordRange {
+  std::uint32_t first = 0;
+  std::uint32_t count = 0;
+};
+/// The moving parts of a model, and the bones that these name.
+RecordRange parts_of(const BundleView& bundle, std::uint32_t model);
+RecordRange bones_of(const BundleView& bundle, std::uint32_t model);
+
+/// Seconds from one clip to the next.
+inline constexpr double kClipBlendSeconds = 0.3;
+
+/// Allocates nothing after its construction.
+class ClipPlayer {
+ public:
+  /// bundle: opened; its bytes outlive the player. model: an index.
+  ClipPlayer(const BundleView& bundle, std::uint32_t model);
+
+  /// A clip of the model from its beginning; within blend_s the present pose turns into it. False
+  /// for one that is not of this model.
+  bool play(std::uint32_t clip, bool loops, double blend_s);
+  /// The pose stays.
+  void stop() { now_.moves = false; }
+  /// As at the start.
+  void reset();
+
+  void advance(double seconds);
+  /// Calculates bones(), if the time is another one than that of the last call.
+  void pose();
+
+  /// The clip that moves the model; kNone: none does, or it has ended.
+  [[nodiscard]] std::uint32_t playing() const { return now_.moves ? now_.clip : kNone; }
+  /// The next pose is another one.
+  [[nodiscard]] bool moves() const { return stale_ || now_.moves || blended_s_ < blend_s_; }
+  /// Of bones_of() the model; empty before the first play(): the rest pose.
+  [[nodiscard]] std::span<const BoneMatrix> bones() const { return posed_ ? bones_ : kRest; }
+
+ private:
+  struct Place {
+    float translation[3];
+    float rotation[4];  ///< x, y, z, w
+    float scale[3];
+  };
+  struct Layer {
+    std::uint32_t clip = kNone;  ///< kNone: the pose of held_
+    double time = 0;             ///< seconds of the clip
+    bool loops = false;
+    bool moves = false;
+    std::vector<std::uint32_t> keys;  ///< that were found last, one a track
+  };
+
+  void move(Layer& layer, double seconds) const;
+  void sample(Layer& layer, std::vector<Place>& places);
+  void blend(float share);
+  void compose();
+
+  static constexpr std::span<const BoneMatrix> kRest{};
+
+  BundleView bundle_;
+  RecordRange joints_;
+  RecordRange clips_;
+  RecordRange bone_range_;
+  std::vector<ClipTracksView> tracks_;  ///< one a clip
+  std::vector<Place> rest_;
+  std::vector<Place> held_;
+  std::vector<Place> places_;
+  std::vector<Place> others_;  ///< of before_
+  std::vector<BoneMatrix> to_model_;
+  std::vector<BoneMatrix> bones_;
+  Layer now_;
+  Layer before_;
+  double blend_s_ = 0;
+  double blended_s_ = 0;  ///< of them
+  bool posed_ = false;
+  bool stale_ = false;
+};
+
+}  // namespace modar
