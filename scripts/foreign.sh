@@ -168,6 +168,8 @@ if [ -n "${budget:-}" ]; then
   # The pattern is covered, and its surroundings are followed.
   measure extended_640x480 extended "$build/demo.modar" 60 46
   measure render_demo render "$build/demo.modar" 8 4
+  # Poses of 60 bones between two clips; at most 150,000.
+  measure clips_60_bones clips "$build/demo.modar" 9 3
   [ -z "$big" ] || measure open_200mb open "$big" 1 1
   [ $fat = no ] || { echo "foreign.sh: above the budget by more than 2 %" >&2; exit 3; }
   exit 0

@@ -318,43 +318,4 @@ BundleContent posed_content(const std::vector<glm::dmat4>& bones) {
   return content;
 }
 
-BundleContent chain_content(std::uint32_t joints, std::uint16_t keys) {
-  BundleContent content = moving_content(1);
-  content.joints.clear();
-  content.bones.clear();
-  content.clip_tracks.clear();
-  std::vector<Curve> curves[2];
-  for (std::uint32_t j = 0; j < joints; ++j) {
-    JointRecord joint{};
-    joint.parent = j == 0 ? kNone : j - 1;
-    put_rows(joint.before, glm::dmat4(1));
-    joint.rotation[3] = 1;
-    std::fill_n(joint.scale, 3, 1.0f);
-    content.joints.push_back(joint);
-    BoneRecord bone{};
-    bone.joint = j;
-    put_rows(bone.inverse, glm::dmat4(1));
-    content.bones.push_back(bone);
-    for (int c = 0; c < 2; ++c) {
-      Curve places{j, TrackPath::kTranslation, {}};
-      Curve turns{j, TrackPath::kRotation, {}};
-      for (std::uint16_t k = 0; k < keys; ++k) {
-        const auto sample = static_cast<std::uint16_t>(k * (samples_of(c) - 1) / (keys - 1));
-        places.keys.push_back({sample, {0.01 * (k % 3), 0.02, 0}});
-        turns.keys.push_back({sample, about({0, 1.0 * c, 1}, (k % 5) * 7.0 + j)});
-      }
-      curves[c].push_back(places);
-      curves[c].push_back(turns);
-    }
-  }
-  for (int c = 0; c < 2; ++c) content.clip_tracks.push_back(track_bytes(curves[c], samples_of(c)));
-  content.parts.clear();
-  const std::uint32_t most = kMostPartBones;
-  for (std::uint32_t first = 0; first < joints; first += most) {
-    content.parts.push_back(
-        {first / most, first, std::min(most, joints - first), 0, {-3, -3, -3}, {3, 3, 3}});
-  }
-  return content;
-}
-
 }  // namespace modar::test

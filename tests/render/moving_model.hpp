@@ -38,8 +38,4 @@ std::vector<glm::dmat4> bone_matrices(const std::vector<JointState>& states);
 /// The same model without parts, its vertices where the bones take them.
 BundleContent posed_content(const std::vector<glm::dmat4>& bones);
 
-/// Many joints in a chain, each with a bone, a track of rotation and one of translation of `keys`
-/// keys in both of two clips: for counting.
-BundleContent chain_content(std::uint32_t joints, std::uint16_t keys);
-
 }  // namespace modar::test

@@ -1,11 +1,12 @@
 // What scripts/foreign.sh budget counts the instructions of, under qemu with a counting plugin:
 // each measured step is between two writes to stdout. Frames are rendered from the bundle's own
 // pattern, so that nothing but the bundle is needed.
-// Usage: budget_probe track|search|clutter|sliced|extended|render|open|memory BUNDLE [WIDTH HEIGHT
-// [FRAMES [BUDGET]]] search: frames that show the pattern; clutter: frames without it; sliced:
-// both, within a budget of some million instructions a frame; extended: before a wall, which
-// alone the last quarter of the frames shows; render: by null_gl.cpp; memory: tracks and
-// draws, and prints what memory the process holds after each stage. track-default, search-default:
+// Usage: budget_probe track|search|clutter|sliced|extended|render|clips|open|memory BUNDLE [WIDTH
+// HEIGHT [FRAMES [BUDGET]]] search: frames that show the pattern; clutter: frames without it;
+// sliced: both, within a budget of some million instructions a frame; extended: before a wall,
+// which alone the last quarter of the frames shows; render: by null_gl.cpp; memory: tracks and
+// draws, and prints what memory the process holds after each stage; clips: two clips of 60 bones
+// blend, of a bundle of its own. track-default, search-default:
 // while the camera is a guess, as apps have it that give none.
 #include <unistd.h>
 
@@ -20,7 +21,9 @@
 #include <glm/geometric.hpp>
 
 #include "formats/bundle_view.hpp"
+#include "formats/bundle_writer.hpp"
 #include "formats/tracker_record.hpp"
+#include "modar/clip_player.hpp"
 #include "modar/mapped_file.hpp"
 #include "modar/pose_loop.hpp"
 #include "modar/renderer.hpp"
@@ -197,6 +200,119 @@ int run_render(const BundleView& bundle, int width, int height, int frames) {
   return 0;
 }
 
+template <class T>
+void put(std::vector<std::byte>& bytes, const T& value) {
+  const auto* from = reinterpret_cast<const std::byte*>(&value);
+  bytes.insert(bytes.end(), from, from + sizeof value);
+}
+
+constexpr std::uint32_t kChainJoints = 60;
+
+/// Each joint turns and moves, by nine keys in two seconds.
+std::vector<std::byte> chain_tracks(double size) {
+  constexpr std::uint16_t kKeys = 9;
+  constexpr std::uint32_t kSamples = 2 * kClipRate + 1;
+  std::vector<std::byte> bytes;
+  std::vector<std::byte> keys;
+  put(bytes, ClipTracksHeader{2 * kChainJoints, kSamples, {}});
+  const std::size_t first = sizeof(ClipTracksHeader) + 2 * kChainJoints * sizeof(TrackRecord);
+  for (std::uint32_t j = 0; j < kChainJoints; ++j) {
+    for (const TrackPath path : {TrackPath::kTranslation, TrackPath::kRotation}) {
+      TrackRecord track{};
+      track.joint = j;
+      track.path = static_cast<std::uint8_t>(path);
+      track.key_count = kKeys;
+      track.keys = static_cast<std::uint32_t>(first + keys.size());
+      if (path == TrackPath::kTranslation) std::fill_n(track.step, 3, 1e-6f);
+      put(bytes, track);
+      for (std::uint32_t k = 0; k < kKeys; ++k)
+        put(keys, static_cast<std::uint16_t>(k * (kSamples - 1) / (kKeys - 1)));
+      for (std::uint32_t k = 0; k < kKeys; ++k) {
+        const double angle = size * std::sin(k + 0.1 * j);
+        std::array<std::uint16_t, 3> words = {static_cast<std::uint16_t>(1000 * k), 2000, 3000};
+        if (path == TrackPath::kRotation)
+          words = pack_rotation({std::sin(angle) * 0.6, 0, std::sin(angle) * 0.8, std::cos(angle)});
+        put(keys, words);
+      }
+    }
+  }
+  bytes.insert(bytes.end(), keys.begin(), keys.end());
+  return bytes;
+}
+
+void set_identity(float (&rows)[12]) {
+  for (int i = 0; i < 3; ++i) rows[5 * i] = 1.0f;
+}
+
+/// A model of nothing but joints in a row, and the two parts that a skin of 60 bones is split into.
+BundleContent chain_content() {
+  BundleContent content;
+  content.meta = "{}";
+  LayoutRecord layout{};
+  layout.stride = 12;
+  layout.attribute_count = 1;
+  layout.attributes[0] = {static_cast<std::uint8_t>(Semantic::kPosition),
+                          static_cast<std::uint8_t>(ComponentType::kF32),
+                          3,
+                          0,
+                          0,
+                          0};
+  content.layouts.push_back(layout);
+  ModelRecord model{};
+  model.name = content.intern("chain");
+  model.scale = 1;
+  model.material_count = 2;
+  content.models.push_back(model);
+  for (std::uint32_t m = 0; m < 2; ++m) {
+    MaterialRecord material{};
+    material.name = content.intern("part");
+    material.opacity = 1;
+    material.texture = kNone;
+    content.materials.push_back(material);
+    content.parts.push_back(
+        {m, m * kChainJoints / 2, kChainJoints / 2, 0, {-1, -1, -1}, {1, 1, 1}});
+  }
+  for (std::uint32_t j = 0; j < kChainJoints; ++j) {
+    JointRecord joint{};
+    joint.parent = j == 0 ? kNone : j - 1;
+    set_identity(joint.before);
+    joint.rotation[3] = 1;
+    std::fill_n(joint.scale, 3, 1.0f);
+    content.joints.push_back(joint);
+    BoneRecord bone{};
+    bone.joint = j;
+    set_identity(bone.inverse);
+    content.bones.push_back(bone);
+  }
+  for (std::uint32_t c = 0; c < 2; ++c) {
+    content.clips.push_back({content.intern(c == 0 ? "walk" : "run"), 0, c, 2.0f, 0.0f, {}});
+    content.clip_tracks.push_back(chain_tracks(0.1 + 0.1 * c));
+  }
+  return content;
+}
+
+int run_clips(int frames) {
+  const auto bytes = encode_bundle(chain_content());
+  if (!bytes) return give_up(to_line(bytes.error()));
+  const auto bundle = BundleView::open(*bytes);
+  if (!bundle) return give_up(to_line(bundle.error()));
+  ClipPlayer player(*bundle, 0);
+  player.play(0, true, 0);
+  player.advance(0.5);
+  player.play(1, true, frames / 30.0);
+  for (int i = 0; i < frames; ++i) {
+    mark("begin\n");
+    player.advance(1 / 30.0);
+    player.pose();
+    mark("end\n");
+  }
+  const BoneMatrix& last = player.bones().back();
+  std::fprintf(stderr, "clips: %zu bones, the last one at %.4f %.4f %.4f\n", player.bones().size(),
+               static_cast<double>(last[0].w), static_cast<double>(last[1].w),
+               static_cast<double>(last[2].w));
+  return 0;
+}
+
 /// What the process has mapped and what of it is resident, in MB of 10^6 bytes (proc(5)).
 void print_memory(const char* stage) {
   std::FILE* status = std::fopen("/proc/self/status", "r");
@@ -241,6 +357,7 @@ int run(int count, char** words) {
   const int height = count > 4 ? std::atoi(words[4]) : 480;
   const int frames = count > 5 ? std::atoi(words[5]) : 30;
   if (what == "memory") return run_memory(*bundle, width, height, frames);
+  if (what == "clips") return run_clips(frames);
   if (what == "render") return run_render(*bundle, width, height, frames);
   return run_frames(what, *bundle, width, height, frames, count > 6 ? std::atoi(words[6]) : 12);
 }

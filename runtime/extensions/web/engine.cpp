@@ -359,7 +359,7 @@ EMSCRIPTEN_KEEPALIVE int web_open() {
       modar_scene_count(engine.bundle) + modar_node_count(engine.bundle) + kMostOwn;
   engine.items = new modar_item[items]();
   for (uint32_t i = 0; i < items; ++i) engine.items[i].size = sizeof(modar_item);
-  engine.events = new modar_event[modar_pattern_count(engine.bundle) + 1]();
+  engine.events = new modar_event[modar_pattern_count(engine.bundle) + kMostOwn + 1]();
   engine.videos = new GLuint[modar_node_count(engine.bundle)]();
   engine.screen = modar_screen_create(engine.bundle, &engine.error);
   return engine.screen == nullptr ? engine.error.status : 0;
@@ -645,7 +645,7 @@ EMSCRIPTEN_KEEPALIVE const char* web_address(uint32_t action) {
 EMSCRIPTEN_KEEPALIVE size_t web_act(double time_s, int kind, uint32_t node, uint32_t material) {
   size_t count = 0;
   engine.events[0].size = sizeof(modar_event);
-  for (uint32_t p = 0; p < modar_pattern_count(engine.bundle); ++p) {
+  for (uint32_t p = 0; p < modar_pattern_count(engine.bundle) + engine.own_count; ++p) {
     if (engine.poses[p].shown == 0.0f) continue;
     engine.events[count++] = {sizeof(modar_event), MODAR_SEEN, p, 0, 0};
   }
@@ -659,6 +659,26 @@ EMSCRIPTEN_KEEPALIVE uint32_t web_command(size_t index, int field) {
   return field == 0   ? static_cast<uint32_t>(command.kind)
          : field == 1 ? command.node
                       : command.action;
+}
+/// Of clips: a name, null: no more; seconds.
+EMSCRIPTEN_KEEPALIVE const char* web_clip_name(uint32_t index) {
+  if (modar_clip_name(engine.bundle, index, engine.text, sizeof engine.text) == 0) return nullptr;
+  return engine.text;
+}
+EMSCRIPTEN_KEEPALIVE double web_clip_seconds(uint32_t index) {
+  auto clip = modar::sized<modar_clip>();
+  modar_clip_at(engine.bundle, index, &clip);
+  return static_cast<double>(clip.seconds);
+}
+/// As modar_clip_play(), modar_clip_stop() and modar_clip_playing().
+EMSCRIPTEN_KEEPALIVE void web_play(uint32_t scene, uint32_t clip, int loops, double blend_s) {
+  modar_clip_play(engine.screen, scene, clip, loops, blend_s);
+}
+EMSCRIPTEN_KEEPALIVE void web_stop(uint32_t scene) {
+  modar_clip_stop(engine.screen, scene);
+}
+EMSCRIPTEN_KEEPALIVE uint32_t web_playing(uint32_t scene) {
+  return modar_clip_playing(engine.screen, scene);
 }
 EMSCRIPTEN_KEEPALIVE int web_acting() {
   return modar_screen_waiting(engine.screen);

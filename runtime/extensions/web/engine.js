@@ -150,6 +150,8 @@ export class Engine {
   nodes = [];
   /** @type {import('./modar.js').Scene[]} */
   scenes = [];
+  /** @type {{name: string, seconds: number}[]} */
+  clips = [];
   width = 0;
   height = 0;
 
@@ -319,6 +321,8 @@ export class Engine {
           pattern: m._web_scene(i, 0),
           model: m.UTF8ToString(m._web_model_name(m._web_scene(i, 1))),
         }));
+    for (let i = 0, at; (at = m._web_clip_name(i)) !== 0; ++i)
+      this.clips.push({name: m.UTF8ToString(at), seconds: m._web_clip_seconds(i)});
   }
 
   /**
@@ -396,6 +400,24 @@ export class Engine {
 
   /** Something turns, or a delay runs: act() and draw() again, though no frame comes. */
   get acting() { return this.#module._web_acting() !== 0; }
+
+  /**
+   * Models that have a clip of this name play it.
+   * @param {string} name
+   * @param {boolean} loops
+   * @param {number} blend seconds
+   */
+  play(name, loops, blend) {
+    this.scenes.forEach((_, scene) => this.clips.forEach((clip, i) => {
+      if (clip.name === name) this.#module._web_play(scene, i, loops ? 1 : 0, blend);
+    }));
+  }
+  stop() { this.scenes.forEach((_, scene) => this.#module._web_stop(scene)); }
+
+  /** Of each scene, the clip that moves its model. */
+  get playing() {
+    return this.scenes.map((_, scene) => this.clips[this.#module._web_playing(scene) - 1]?.name);
+  }
 
   forgetActs() { this.#module._web_forget_acts(); }
 

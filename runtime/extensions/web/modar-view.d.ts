@@ -37,6 +37,8 @@ export interface ViewEvents {
   link: CustomEvent<{ address: string }>;
   caption: CustomEvent<{ node: number; text: string; language: string }>;
   drawn: Event;
+  /** A clip that does not loop has ended. */
+  clipend: CustomEvent<{ name: string; scene: number }>;
   refined: Event;
   error: CustomEvent<unknown>;
 }
@@ -89,6 +91,15 @@ export class View extends EventTarget {
   /** Those of the bundle, then those of stand(). */
   readonly patterns: { name: string; widthMm?: number }[];
   readonly nodes: SceneNode[];
+  /** Movements of models. */
+  readonly clips: { name: string; seconds: number }[];
+  /**
+   * Models that have a clip of this name play it from its beginning, again and again unless `loop` is false. blend: seconds in
+   * which they turn from their present poses (0.3).
+   */
+  play(name: string, options?: { loop?: boolean; blend?: number }): void;
+  /** All models stay in their present poses. */
+  stop(): void;
   /** Words of a node in the first of these languages that it has, else in any. */
   wordsOf(node: number, languages?: string[]): { language: string; title: string; text: string; alt: string };
   /** The visitor tapped the canvas of the models, CSS pixels from its top left. Answers the node there, or null. */

@@ -125,6 +125,7 @@ export class View extends EventTarget {
   /** The pattern that is looked at without a camera; -1: none. */
   #around = -1;
   /** Of media.js, which is loaded where a bundle has videos or sounds. */
+  #playing = /** @type {(string | undefined)[]} */ ([]);
   #media = /** @type {Media} */ (/** @type {unknown} */ ({
     sound: false,
     held: false,
@@ -326,6 +327,27 @@ export class View extends EventTarget {
    */
   get nodes() { return this.#engine.nodes; }
 
+  /** Movements of models: {name, seconds}. */
+  get clips() { return this.#engine.clips; }
+
+  /**
+   * Models that have a clip of this name play it from its beginning. blend: seconds in which they
+   * turn from their present poses.
+   * @param {string} name
+   * @param {{loop?: boolean, blend?: number}} options
+   */
+  play(name, {loop = true, blend = 0.3} = {}) {
+    this.#engine.play(name, loop, blend);
+    this.#playing = this.#engine.playing;
+    this.#soon();
+  }
+
+  /** All models stay in their present poses. */
+  stop() {
+    this.#engine.stop();
+    this.#playing = [];
+  }
+
   /**
    * A node's words in the first of these languages that it has, else in any: {language, title,
    * text, alt}.
@@ -427,6 +449,7 @@ export class View extends EventTarget {
     cancelAnimationFrame(this.#handle);
     this.#handle = 0;
     this.#engine.forgetActs();
+    this.#playing = [];
     this.#media.close();
   }
 
@@ -518,8 +541,8 @@ export class View extends EventTarget {
   }
 
   #act() {
-    if (this.nodes.length === 0 || (this.#plays && !this.#complete))
-      return;  // what plays has to be there
+    const still = this.nodes.length + this.clips.length === 0;
+    if (still || (this.#plays && !this.#complete)) return;  // what plays has to be there
     /** @type {Happened[]} */
     const happened = [
       ...this.#media.ended.splice(0).map((node) => ({node, ended: true})), ...this.#taps.splice(0)
@@ -534,6 +557,10 @@ export class View extends EventTarget {
         else this.#tell('text', {node: todo.text});
       }
     }
+    const {playing} = this.#engine;
+    for (const [scene, name] of this.#playing.entries())
+      if (name && !playing[scene]) this.#tell('clipend', {name, scene});
+    this.#playing = playing;
     if (!this.#lost) this.#media.upload(this.#gl.context);
   }
 

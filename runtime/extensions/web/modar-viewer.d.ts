@@ -48,6 +48,8 @@ export interface ModarViewerEventMap extends Omit<HTMLElementEventMap, 'error'>,
   text: CustomEvent<{ pattern: number; node: string; language: string; title: string; text: string }>;
   /** An action would open another page. The viewer asks the visitor, unless you call preventDefault(). */
   link: CustomEvent<{ address: string }>;
+  /** A clip that does not loop has ended; see play(). */
+  clipend: CustomEvent<{ name: string; scene: number }>;
   /** After picture and models were drawn, in the same task: copies of `layers` are whole now. */
   frame: CustomEvent<Frame>;
 }
@@ -84,6 +86,10 @@ export class ModarViewer extends HTMLElement {
   addPattern(image: HTMLImageElement | HTMLCanvasElement | ImageBitmap, options?: {
     name?: string; widthMm?: number; scene?: number;
   }): Promise<number>;
+  /** Movements of the models of the bundle that is loaded. */
+  readonly clips: { name: string; seconds: number }[];
+  /** As View.play(): models that have a clip of this name play it. stop() ends it, too: models are as baked after it. */
+  play(name: string, options?: { loop?: boolean; blend?: number }): void;
   /** As the start button: call it in a click's handler. loaded: the promise to await together with the camera, load() unless stated otherwise. */
   start(loaded?: Promise<void>): Promise<void>;
   /** The content of a pattern, without a camera. */

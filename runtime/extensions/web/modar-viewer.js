@@ -12,6 +12,7 @@ import {directionOf, fill, labelOf, showWords, wordsFor} from './viewer-words.js
 
 /** Pictures that a hint has room for. */
 const MOST_PLATES = 4;
+const reducesMotion = () => matchMedia('(prefers-reduced-motion: reduce)').matches;
 
 /**
  * @typedef {import('./modar-viewer.js').ViewerPattern} ViewerPattern
@@ -191,6 +192,13 @@ export class ModarViewer extends (globalThis.HTMLElement ?? Object) {
 
   /** The sound of videos and sounds as a stream, or null. Asked for in a click's handler. */
   get film() { return this.#view?.film ?? null; }
+
+  get clips() { return this.#view?.clips ?? []; }
+  /**
+   * @param {string} name
+   * @param {{loop?: boolean, blend?: number}} [options]
+   */
+  play(name, options) { this.#view?.play(name, options); }
 
   /** @returns {ViewerPattern[]} */
   get patterns() { return this.#patterns ?? []; }
@@ -648,7 +656,7 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
     const src = await pictureOf(picture);
     if (this.#state !== 'around') return;
     Object.assign(this.#$('ground'), {width, height, src, hidden: flat === false});
-    this.#view.lookAround(pattern, !matchMedia('(prefers-reduced-motion: reduce)').matches);
+    this.#view.lookAround(pattern, !reducesMotion());
   }
 
   /** The picture below the content. */
@@ -762,7 +770,11 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
 
   /** @param {View} view */
   #listenToScenes(view) {
-    this.#$('media').hidden = !view.nodes.some(({kind}) => kind === 'video' || kind === 'sound');
+    const sounds = view.nodes.some(({kind}) => kind === 'video' || kind === 'sound');
+    this.#$('media').hidden = !sounds && !view.clips.length;
+    this.#$('sound').hidden = !sounds;
+    // What moves by itself waits for who wants that.
+    if (view.clips.length && reducesMotion()) view.press(5);
     this.#$('captions').hidden = !view.nodes.some((_, node) => view.captionsOf(node));
     this.#useLanguages();
     this.#cues.clear();
@@ -771,6 +783,8 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
       if (this.#state === 'around' && this.#shown >= 0) this.#layGround();
     });  // a last frame may come late
     view.addEventListener('caption', ({detail}) => this.#caption(detail));
+    view.addEventListener(
+        'clipend', ({detail}) => this.dispatchEvent(new CustomEvent('clipend', {detail})));
     view.addEventListener('text', ({detail: {node}}) => {
       const {pattern, name, mark} = view.nodes[node];
       const {language, title, text} = this.#wordsOf(node);
