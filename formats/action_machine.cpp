@@ -34,6 +34,7 @@ ActionMachine::ActionMachine(const BundleView& bundle)
       nodes_(bundle.nodes().size()),
       fired_(bundle.actions().size()) {
   commands_.resize(2 * nodes_.size() + fired_.size());
+  clips_.reserve(fired_.size());
   reset();
 }
 
@@ -53,6 +54,7 @@ std::span<const SceneCommand> ActionMachine::step(double time_s,
                                                   std::span<const SceneEvent> events) {
   now_ = time_s > now_ ? time_s : now_;
   command_count_ = 0;
+  clips_.clear();
   for (Node& node : nodes_) node.told = false;
   for (const SceneEvent& event : events) {
     if (event.kind != SceneEvent::Kind::kEnded || event.subject >= nodes_.size()) continue;
@@ -170,6 +172,11 @@ void ActionMachine::perform(std::uint32_t index) {
     case ActionCommand::kText:
       if (!target->told) commands_[command_count_++] = {ActionCommand::kText, action.target, index};
       target->told = true;
+      break;
+    case ActionCommand::kClip:
+    case ActionCommand::kClipOnce:
+    case ActionCommand::kStop:
+      clips_.push_back(index);
       break;
     case ActionCommand::kLink:
       commands_[command_count_++] = {ActionCommand::kLink, kNone, index};

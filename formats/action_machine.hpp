@@ -52,6 +52,9 @@ class ActionMachine {
   /// nothing.
   std::span<const SceneCommand> step(double time_s, std::span<const SceneEvent> events);
 
+  /// Of the last step: actions that begin or stop clips, in their order. ScreenMachine does that.
+  [[nodiscard]] std::span<const std::uint32_t> clips() const { return clips_; }
+
   /// As at the start.
   void reset();
 
@@ -92,6 +95,7 @@ class ActionMachine {
   std::vector<Node> nodes_;
   /// One an action: 1 in the step in which it fires; of delays, since the pattern was found.
   std::vector<std::uint8_t> fired_;
+  std::vector<std::uint32_t> clips_;
   std::vector<SceneCommand> commands_;  ///< room for all actions, each node twice
   std::size_t command_count_ = 0;
   double now_ = 0;

@@ -89,7 +89,16 @@ enum class ActionCommand : std::uint32_t {
   kLink = 7,  ///< the visitor decides whether to go there
   kNext = 8,  ///< the next variant of the target's group takes the place of the one that is shown
   kTurn = 10,
+  kClip = 11,      ///< since 1.4: the model of the target plays a clip, again and again
+  kClipOnce = 12,  ///< the same, and its last pose stays
+  kStop = 13,      ///< the present pose stays
 };
+
+/// Names a clip.
+constexpr bool plays_clip(std::uint32_t command) {
+  return command == static_cast<std::uint32_t>(ActionCommand::kClip) ||
+         command == static_cast<std::uint32_t>(ActionCommand::kClipOnce);
+}
 
 /// The reaction to an event.
 struct ActionRecord {
@@ -98,7 +107,7 @@ struct ActionRecord {
   std::uint32_t source;   ///< of a tap the node, else the pattern
   std::uint32_t target;   ///< node of the source's pattern; of a link kNone
   NameRef part;           ///< of a tap on a model: the material that is tapped; empty: any
-  NameRef address;        ///< of a link: "https://..."; else empty
+  NameRef address;        ///< of a link: "https://..."; the name of a clip; else empty
   float seconds;          ///< of kAfter: the delay; else 0
   float duration;         ///< of a turn: seconds that it takes; else 0
   float axis[3];  ///< of a turn: unit length, pattern axes, through the node's place; else 0

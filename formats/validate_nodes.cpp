@@ -135,8 +135,8 @@ void check_node(const RecordCheck& check, const BundleParts& parts, std::uint32_
 
 bool known_action(const ActionRecord& action) {
   using enum ActionCommand;
-  constexpr ActionCommand kCommands[] = {kPlay, kPause, kShow, kHide, kToggle,
-                                         kText, kLink,  kNext, kTurn};
+  constexpr ActionCommand kCommands[] = {kPlay, kPause, kShow, kHide, kToggle,   kText,
+                                         kLink, kNext,  kTurn, kClip, kClipOnce, kStop};
   return action.event >= static_cast<std::uint32_t>(ActionEvent::kFound) &&
          action.event <= static_cast<std::uint32_t>(ActionEvent::kAfter) &&
          std::find(std::begin(kCommands), std::end(kCommands),
@@ -151,6 +151,16 @@ std::uint32_t pattern_of(const BundleParts& parts, const ActionRecord& action) {
   return action.source < parts.nodes.size() ? parts.nodes[action.source].pattern : kNone;
 }
 
+/// Whether the model of a model's node has a clip of that name.
+bool has_clip(const BundleParts& parts, const NodeRecord& node, NameRef name) {
+  const std::uint32_t model =
+      node.subject < parts.scenes.size() ? parts.scenes[node.subject].model : kNone;
+  for (const ClipRecord& clip : parts.clips) {
+    if (clip.model == model && text_of(parts, clip.name) == text_of(parts, name)) return true;
+  }
+  return false;
+}
+
 /// Whether its command can be done to its target.
 bool fits_command(const BundleParts& parts, const ActionRecord& action) {
   const auto command = static_cast<ActionCommand>(action.command);
@@ -160,6 +170,9 @@ bool fits_command(const BundleParts& parts, const ActionRecord& action) {
   if (target.pattern != pattern_of(parts, action)) return false;
   const bool play = command == ActionCommand::kPlay || command == ActionCommand::kPause;
   if (play || kind_is(target, NodeKind::kSound)) return play && plays_media(target);
+  if (command >= ActionCommand::kClip)
+    return kind_is(target, NodeKind::kModel) &&
+           (command == ActionCommand::kStop || has_clip(parts, target, action.address));
   if (command == ActionCommand::kText) return kind_is(target, NodeKind::kLabel);
   if (command == ActionCommand::kNext) return target.group != 0;
   if (command == ActionCommand::kTurn) return !kind_is(target, NodeKind::kLabel);
@@ -173,7 +186,8 @@ bool idle_fields_are_zero(const BundleParts& parts, const ActionRecord& action) 
   const bool link = action.command == static_cast<std::uint32_t>(ActionCommand::kLink);
   const bool part =
       event == ActionEvent::kTap && kind_is(parts.nodes[action.source], NodeKind::kModel);
-  return (part || action.part.length == 0) && (link || action.address.length == 0) &&
+  const bool addressed = link || plays_clip(action.command);
+  return (part || action.part.length == 0) && (addressed || action.address.length == 0) &&
          (event == ActionEvent::kAfter || action.seconds == 0.0f) &&
          (turn ? unit_length(action.axis)
                : zero(action.axis) && action.duration == 0.0f && action.degrees == 0.0f);

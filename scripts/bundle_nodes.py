@@ -6,7 +6,7 @@ from bundle_bytes import NONE, flags_known, need
 
 MODEL, PICTURE, LABEL, VIDEO, SOUND = 1, 2, 3, 4, 5
 FOUND, LOST, TAP, AFTER = 1, 2, 3, 4
-PLAY, PAUSE, SHOW, HIDE, TOGGLE, TEXT, LINK, NEXT, TURN = 1, 2, 3, 4, 5, 6, 7, 8, 10
+PLAY, PAUSE, SHOW, HIDE, TOGGLE, TEXT, LINK, NEXT, TURN, CLIP, CLIP_ONCE, STOP = 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13
 
 
 UNSEEN = ("\x00- \x7f-\xa0\xad\u034f\u061c\u115f\u1160\u1680\u17b4\u17b5\u180b-\u180f\u2000-\u200f\u2028-\u202f\u205f-\u206f\u2800\u3000\u3164"
@@ -56,7 +56,7 @@ def check_action(bundle, row):
     source = None
     if row["source"] < len(nodes if event == TAP else bundle.tables["patterns"]):
         source = nodes[row["source"]]["pattern"] if event == TAP else row["source"]
-    if event not in (FOUND, LOST, TAP, AFTER) or command not in (PLAY, PAUSE, SHOW, HIDE, TOGGLE, TEXT, LINK, NEXT, TURN):
+    if event not in (FOUND, LOST, TAP, AFTER) or command not in (PLAY, PAUSE, SHOW, HIDE, TOGGLE, TEXT, LINK, NEXT, TURN, CLIP, CLIP_ONCE, STOP):
         need(not bundle.strict and (source is not None or event > AFTER), "BUNDLE_ENUM", at)
         return
     need(source is not None, "BUNDLE_ACTION", at, "source")
@@ -68,8 +68,13 @@ def check_action(bundle, row):
         need(target["pattern"] == source and (command > PAUSE or target["kind"] in (VIDEO, SOUND)) and
              (command <= PAUSE or target["kind"] != SOUND) and (command != TEXT or target["kind"] == LABEL) and
              (command != NEXT or target["group"] > 0) and (command != TURN or target["kind"] != LABEL), "BUNDLE_ACTION", at)
+        if command >= CLIP:
+            need(target["kind"] == MODEL, "BUNDLE_ACTION", at, "target")
+            model = bundle.tables["scenes"][target["subject"]]["model"]
+            names = [clip["name"] for clip in bundle.tables["clips"] if clip["model"] == model]
+            need(command == STOP or row["address"] in names, "BUNDLE_ACTION", at, "clip")
     model = event == TAP and nodes[row["source"]]["kind"] == MODEL
-    need((model or not row["part"]) and (command == LINK or not row["address"]) and (event == AFTER or not row["seconds"]) and
+    need((model or not row["part"]) and (command in (LINK, CLIP, CLIP_ONCE) or not row["address"]) and (event == AFTER or not row["seconds"]) and
          (unit(row["axis"]) if command == TURN else not any([*row["axis"], row["duration"], row["degrees"]])),
          "BUNDLE_ACTION", at, "a field of another kind")
     need(command != LINK or is_link(row["address"]), "ACTION_LINK", at)

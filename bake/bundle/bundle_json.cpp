@@ -536,8 +536,8 @@ Json node_json(const BundleView& bundle, std::uint32_t index) {
 
 /// "tap pot (lid): turn pot by 90 about x in 1.5s", as modar.toml has it.
 std::string action_words(const BundleView& bundle, const ActionRecord& action) {
-  constexpr const char* kCommands[] = {"",     "play", "pause", "show", "hide", "toggle",
-                                       "text", "link", "next",  "",     "turn"};
+  constexpr const char* kCommands[] = {"",     "play", "pause", "show", "hide", "toggle", "text",
+                                       "link", "next", "",      "turn", "play", "play",   "stop"};
   const auto number = [](float value) {
     char text[32];
     std::snprintf(text, sizeof text, "%.6g", static_cast<double>(value));
@@ -563,8 +563,10 @@ std::string action_words(const BundleView& bundle, const ActionRecord& action) {
   }
   if (action.command >= std::size(kCommands)) return words;
   words += std::string(": ") + kCommands[action.command] + " ";
-  if (action.address.length != 0) return words + std::string(bundle.name(action.address));
+  if (action.address.length != 0) words += std::string(bundle.name(action.address));
+  if (plays_clip(action.command)) words += " on ";
   if (action.target < bundle.nodes().size()) words += node(action.target);
+  if (action.command == static_cast<std::uint32_t>(ActionCommand::kClipOnce)) words += " once";
   if (action.command != static_cast<std::uint32_t>(ActionCommand::kTurn)) return words;
   words += " by " + number(action.degrees);
   for (int axis = 0; axis < 3; ++axis) {

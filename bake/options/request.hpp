@@ -123,7 +123,7 @@ struct ActionRequest {
   double seconds = 0;  ///< of kAfter
   ActionCommand command = ActionCommand::kShow;
   std::string target;   ///< of all but a link
-  std::string address;  ///< of a link
+  std::string address;  ///< of a link; the name of a clip
   int axis = 2;         ///< of a turn: 0 x, 1 y, 2 z of the pattern
   double degrees = 0;   ///< of a turn
   double duration = 0;  ///< of a turn: seconds

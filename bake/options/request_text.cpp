@@ -297,6 +297,19 @@ bool parse_turn_command(std::string_view text, ActionRequest& action) {
   return good;
 }
 
+/// "CLIP on NAME", "CLIP on NAME once".
+bool parse_clip_command(std::string_view text, ActionRequest& action) {
+  constexpr std::string_view kOnce = " once";
+  const bool once = text.ends_with(kOnce);
+  if (once) text.remove_suffix(kOnce.size());
+  const std::size_t on = text.rfind(" on ");
+  if (on == std::string_view::npos || on == 0 || on + 4 == text.size()) return false;
+  action.command = once ? ActionCommand::kClipOnce : ActionCommand::kClip;
+  action.address = std::string(text.substr(0, on));
+  action.target = std::string(text.substr(on + 4));
+  return true;
+}
+
 }  // namespace
 
 tl::expected<void, WrongValue> parse_event(std::string_view text, ActionRequest& action) {
@@ -346,7 +359,7 @@ tl::expected<void, WrongValue> parse_command(std::string_view text, ActionReques
       {"show", ActionCommand::kShow},     {"hide", ActionCommand::kHide},
       {"toggle", ActionCommand::kToggle}, {"text", ActionCommand::kText},
       {"next", ActionCommand::kNext},     {"link", ActionCommand::kLink},
-      {"turn", ActionCommand::kTurn}};
+      {"turn", ActionCommand::kTurn},     {"stop", ActionCommand::kStop}};
   for (const auto& [word, command] : kCommands) {
     const std::string_view rest = behind(text, word);
     if (rest.empty()) continue;
@@ -362,6 +375,7 @@ tl::expected<void, WrongValue> parse_command(std::string_view text, ActionReques
       return tl::unexpected(
           WrongValue{"links lead to https addresses only", "write link https://museum.org/vase"});
     }
+    if (command == ActionCommand::kPlay && parse_clip_command(rest, action)) return {};
     if (command != ActionCommand::kTurn) {
       action.target = std::string(rest);
       return {};
@@ -372,8 +386,8 @@ tl::expected<void, WrongValue> parse_command(std::string_view text, ActionReques
   }
   return tl::unexpected(
       WrongValue{"there is no such command",
-                 "write play, pause, show, hide, toggle, text, next or turn and a NAME, or link "
-                 "https://..."});
+                 "write play, pause, show, hide, toggle, text, next, turn or stop and a NAME, play "
+                 "CLIP on NAME, or link https://..."});
 }
 
 Result<SceneRequest> parse_scene(const std::string& text) {

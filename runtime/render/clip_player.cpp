@@ -112,26 +112,29 @@ ClipPlayer::ClipPlayer(const BundleView& bundle, std::uint32_t model)
     tracks_.push_back(bundle.clip_tracks(clips_.first + i));
     most = std::max(most, tracks_.back().tracks.size());
   }
-  now_.keys.resize(most);
-  before_.keys.resize(most);
+  keys_.resize(2 * most);
+  before_.keys = static_cast<std::uint32_t>(most);
+  places_.resize(std::size_t{kSets} * joints_.count);
   for (std::uint32_t i = 0; i < joints_.count; ++i) {
     const JointRecord& joint = bundle.joints()[joints_.first + i];
-    Place place;
+    Place& place = places_[i];
     std::copy_n(joint.translation, 3, place.translation);
     std::copy_n(joint.rotation, 4, place.rotation);
     std::copy_n(joint.scale, 3, place.scale);
-    rest_.push_back(place);
   }
-  held_ = places_ = others_ = rest_;
-  to_model_.resize(joints_.count);
-  bones_.resize(bone_range_.count);
+  matrices_.resize(joints_.count + bone_range_.count);
+  reset();
+}
+
+void ClipPlayer::copy(Set from, Set to) {
+  std::copy_n(set(from), joints_.count, set(to));
 }
 
 void ClipPlayer::reset() {
   now_.clip = before_.clip = kNone;
   now_.moves = before_.moves = posed_ = stale_ = false;
   blend_s_ = 0;
-  held_ = rest_;
+  copy(kRest, kHeld);
 }
 
 bool ClipPlayer::play(std::uint32_t clip, bool loops, double blend_s) {
@@ -139,7 +142,7 @@ bool ClipPlayer::play(std::uint32_t clip, bool loops, double blend_s) {
   if (blended_s_ < blend_s_) {
     // Two clips are on their way: their pose is where this one begins.
     pose();
-    held_ = places_;
+    copy(kNow, kHeld);
     now_.clip = kNone;
     now_.moves = false;
   }
@@ -173,17 +176,17 @@ void ClipPlayer::advance(double seconds) {
 void ClipPlayer::pose() {
   if (!stale_) return;
   stale_ = false;
-  sample(now_, places_);
+  sample(now_, kNow);
   if (blended_s_ < blend_s_) {
-    sample(before_, others_);
+    sample(before_, kBefore);
     blend(static_cast<float>(blended_s_ / blend_s_));
   }
   compose();
 }
 
-void ClipPlayer::sample(Layer& layer, std::vector<Place>& places) {
+void ClipPlayer::sample(const Layer& layer, Set to) {
   const bool holds = layer.clip == kNone;
-  std::copy_n((holds ? held_ : rest_).begin(), places.size(), places.begin());
+  copy(holds ? kHeld : kRest, to);
   const ClipTracksView none;
   const ClipTracksView& view = holds ? none : tracks_[layer.clip - clips_.first];
   if (view.tracks.empty()) return;
@@ -192,9 +195,9 @@ void ClipPlayer::sample(Layer& layer, std::vector<Place>& places) {
   const auto time = static_cast<float>(length > 0 ? layer.time / length * last : 0);
   for (std::size_t i = 0; i < view.tracks.size(); ++i) {
     const TrackRecord& track = view.tracks[i];
-    if (track.joint >= places.size()) break;  // they are sorted
-    const TrackValue value = view.at(track, time, layer.keys[i]);
-    Place& place = places[track.joint];
+    if (track.joint >= joints_.count) break;  // they are sorted
+    const TrackValue value = view.at(track, time, keys_[layer.keys + i]);
+    Place& place = set(to)[track.joint];
     switch (static_cast<TrackPath>(track.path)) {
       case TrackPath::kTranslation:
         std::copy_n(value.begin(), 3, place.translation);
@@ -209,11 +212,11 @@ void ClipPlayer::sample(Layer& layer, std::vector<Place>& places) {
   }
 }
 
-/// share: of places_; the rest is of others_.
+/// share: of kNow, where it stays; the rest is of kBefore.
 void ClipPlayer::blend(float share) {
-  for (std::size_t j = 0; j < places_.size(); ++j) {
-    Place& to = places_[j];
-    const Place& from = others_[j];
+  for (std::size_t j = 0; j < joints_.count; ++j) {
+    Place& to = set(kNow)[j];
+    const Place& from = set(kBefore)[j];
     mix(to.translation, from.translation, share);
     mix(to.scale, from.scale, share);
     float dot = 0;
@@ -231,17 +234,18 @@ void ClipPlayer::compose() {
   const Table<JointRecord> joints = bundle_.joints();
   for (std::uint32_t j = 0; j < joints_.count; ++j) {
     const JointRecord& joint = joints[joints_.first + j];
-    const Place& place = places_[j];
+    const Place& place = set(kNow)[j];
     const BoneMatrix own = times(glm::make_mat3x4(joint.before),
                                  matrix_of(place.translation, place.rotation, place.scale));
     const std::uint32_t parent = joint.parent - joints_.first;
-    to_model_[j] = joint.parent != kNone && parent < j ? times(to_model_[parent], own) : own;
+    matrices_[j] = joint.parent != kNone && parent < j ? times(matrices_[parent], own) : own;
   }
   const Table<BoneRecord> bones = bundle_.bones();
   for (std::uint32_t b = 0; b < bone_range_.count; ++b) {
     const BoneRecord& bone = bones[bone_range_.first + b];
     const std::uint32_t joint = bone.joint - joints_.first;
-    if (joint < joints_.count) bones_[b] = times(to_model_[joint], glm::make_mat3x4(bone.inverse));
+    if (joint < joints_.count)
+      matrices_[joints_.count + b] = times(matrices_[joint], glm::make_mat3x4(bone.inverse));
   }
 }
 

@@ -171,8 +171,9 @@ std::span<const DrawItem> DrawList::pose(const BundleView& bundle,
     return item.bones == nullptr || item.model >= bundle.models().size();
   };
   if (bundle.moving_parts().empty() || std::all_of(items.begin(), items.end(), rests)) return items;
-  posed_.assign(items.begin(), items.end());
+  posed_.clear();
   first_parts_.clear();
+  for (const DrawItem& item : items) posed_.push_back(item);
   for (const DrawItem& item : items) {
     first_parts_.push_back(0);
     if (rests(item)) continue;
@@ -186,7 +187,9 @@ std::span<const DrawItem> DrawList::pose(const BundleView& bundle,
       moved.model = moved.node = kNone;
       moved.bones += part.first_bone - first_bone;
       if (part.bone_count > 1) continue;
-      moved.to_eye = item.to_eye * glm::transpose(glm::mat4(*moved.bones));
+      const BoneMatrix& bone = *moved.bones;
+      for (int c = 0; c < 4; ++c)
+        moved.to_eye[c] = item.to_eye * glm::vec4(bone[0][c], bone[1][c], bone[2][c], c / 3);
       moved.bones = nullptr;
     }
   }

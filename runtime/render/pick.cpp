@@ -67,14 +67,16 @@ glm::dvec3 turned(const LayoutRecord& layout, const std::byte* vertex, const Par
                   const BoneMatrix* bones, const glm::dvec3& rest) {
   const AttributeRecord* joints = find_attribute(layout, Semantic::kJoints);
   const AttributeRecord* weights = find_attribute(layout, Semantic::kWeights);
-  const glm::dvec4 point(rest, 1.0);
-  if (part.bone_count == 1 || joints == nullptr || weights == nullptr)
-    return point * glm::dmat3x4(bones[0]);
+  const bool rigid = part.bone_count == 1 || joints == nullptr || weights == nullptr;
   glm::dvec3 sum(0.0);
-  for (std::uint32_t i = 0; i < 4; ++i) {
-    const auto bone = static_cast<std::uint32_t>(decode_component(*joints, vertex, i));
+  for (std::uint32_t i = 0; i < (rigid ? 1 : 4); ++i) {
+    const double weight = rigid ? 1.0 : decode_component(*weights, vertex, i);
+    const auto bone = rigid ? 0u : static_cast<std::uint32_t>(decode_component(*joints, vertex, i));
     if (bone >= part.bone_count) continue;
-    sum += decode_component(*weights, vertex, i) * (point * glm::dmat3x4(bones[bone]));
+    for (int row = 0; row < 3; ++row) {
+      const glm::dvec4 line(bones[bone][row]);
+      sum[row] += weight * (line.x * rest.x + line.y * rest.y + line.z * rest.z + line.w);
+    }
   }
   return sum;
 }

@@ -155,8 +155,26 @@ std::span<const SceneCommand> ScreenMachine::step(double time_s,
     return command.command == ActionCommand::kPlay;
   });
   if (tapped && plays && !asked_) press(MODAR_SOUND, 1);
-  if (!motions_.empty()) step_clips(time_s, events);
+  if (motions_.empty()) return commands;
+  const double seconds = time_s - std::exchange(clip_time_, time_s);
+  for (Motion& motion : motions_) {
+    if (!std::exchange(motion.fresh, false) && status_.paused == 0) motion.player.advance(seconds);
+  }
+  for (const std::uint32_t action : actions_.clips()) act_clip(bundle_.actions()[action]);
+  step_clips(events);
   return commands;
+}
+
+/// Validated: the target is a scene's model, which has that clip.
+void ScreenMachine::act_clip(const ActionRecord& action) {
+  const std::uint32_t scene = bundle_.nodes()[action.target].subject;
+  if (!plays_clip(action.command)) return stop(scene);
+  const bool loops = action.command == static_cast<std::uint32_t>(ActionCommand::kClip);
+  for (std::uint32_t i = 0; i < bundle_.clips().size(); ++i) {
+    if (bundle_.name(bundle_.clips()[i].name) == bundle_.name(action.address) &&
+        motions_[scene].player.play(i, loops, kClipBlendSeconds))
+      return;
+  }
 }
 
 bool ScreenMachine::shows(const SceneEvent& event, std::uint32_t scene) const {
@@ -166,11 +184,9 @@ bool ScreenMachine::shows(const SceneEvent& event, std::uint32_t scene) const {
   return event.subject - baked < own_.size() && own_[event.subject - baked] == scene;
 }
 
-void ScreenMachine::step_clips(double time_s, std::span<const SceneEvent> events) {
-  const double seconds = time_s - std::exchange(clip_time_, time_s);
+void ScreenMachine::step_clips(std::span<const SceneEvent> events) {
   for (std::uint32_t scene = 0; scene < motions_.size(); ++scene) {
     Motion& motion = motions_[scene];
-    if (status_.paused == 0) motion.player.advance(seconds);
     motion.seen = std::any_of(events.begin(), events.end(),
                               [&](const SceneEvent& event) { return shows(event, scene); });
     if (!motion.seen) continue;
@@ -182,13 +198,16 @@ void ScreenMachine::step_clips(double time_s, std::span<const SceneEvent> events
 /// An app may have begun another one before.
 void ScreenMachine::begin_clip(std::uint32_t scene) {
   for (const SceneClipRecord& clip : bundle_.scene_clips()) {
-    if (clip.scene == scene && motions_[scene].player.bones().empty())
-      play(scene, clip.clip, (clip.flags & kSceneClipLoops) != 0, 0);
+    ClipPlayer& player = motions_[scene].player;
+    if (clip.scene == scene && player.bones().empty())
+      player.play(clip.clip, (clip.flags & kSceneClipLoops) != 0, 0);
   }
 }
 
 bool ScreenMachine::play(std::uint32_t scene, std::uint32_t clip, bool loops, double blend_s) {
-  return scene < motions_.size() && motions_[scene].player.play(clip, loops, blend_s);
+  if (scene >= motions_.size() || !motions_[scene].player.play(clip, loops, blend_s)) return false;
+  motions_[scene].fresh = true;
+  return true;
 }
 
 void ScreenMachine::stop(std::uint32_t scene) {

@@ -84,6 +84,7 @@ TEST_F(ClipScreenTest, ScenesHaveTheirOwnClocks) {
   step(0);
   step(0.4);
   ASSERT_EQ(modar_clip_play(screen_, 1, 1, 0, 0), 1);
+  step(0.4);  // from this step on, whenever the one before was
   step(0.6);
   expect_at(0, 0, 0.6);
   expect_at(1, 1, 0.2);
@@ -101,10 +102,19 @@ TEST_F(ClipScreenTest, ScenesHaveTheirOwnClocks) {
 
 TEST_F(ClipScreenTest, AnAppsClipReplacesTheBundles) {
   modar_clip_play(screen_, 0, 1, 1, 0);
-  step(5);
-  step(5.1);
+  step(500);
+  step(500.1);
   EXPECT_EQ(modar_clip_playing(screen_, 0), 2u);
   expect_at(0, 1, 0.1);
+}
+
+TEST_F(ClipScreenTest, AClipBeginsAtTheNextStep) {
+  step(0);
+  modar_clip_play(screen_, 0, 1, 0, 0);
+  step(100);
+  expect_at(0, 1, 0);
+  step(100.2);
+  expect_at(0, 1, 0.2);
 }
 
 TEST_F(ClipScreenTest, WaitsWhilePaused) {
@@ -127,6 +137,70 @@ TEST_F(ClipScreenTest, ItemsHaveThePose) {
   modar_screen_items(screen_, 0, kUnturned, items, 4);
   ASSERT_NE(items[1].bones, nullptr);
   EXPECT_EQ(items[1].bones[3], bones(1)[3]);
+}
+
+/// found: wave once; tap on the model: walk; after 3 s: stop.
+BundleContent acting_model() {
+  BundleContent content = moving_content(1);
+  NodeRecord node{};
+  node.name = content.intern("strip");
+  node.kind = static_cast<std::uint32_t>(NodeKind::kModel);
+  node.rotation[3] = 1;
+  content.nodes.push_back(node);
+  const auto add = [&](ActionEvent event, ActionCommand command, const char* clip, float seconds) {
+    ActionRecord action{};
+    action.event = static_cast<std::uint32_t>(event);
+    action.command = static_cast<std::uint32_t>(command);
+    action.address = content.intern(clip);
+    action.seconds = seconds;
+    content.actions.push_back(action);
+  };
+  add(ActionEvent::kFound, ActionCommand::kClipOnce, "wave", 0);
+  add(ActionEvent::kTap, ActionCommand::kClip, "walk", 0);
+  add(ActionEvent::kAfter, ActionCommand::kStop, "", 3);
+  return content;
+}
+
+class ClipActionTest : public ClipScreenTest {
+ protected:
+  ClipActionTest() : ClipScreenTest(acting_model()) {}
+};
+
+TEST_F(ClipActionTest, PlaysAndStops) {
+  step(0);
+  EXPECT_EQ(modar_clip_playing(screen_, 0), 2u);
+  step(0.4);
+  expect_at(0, 1, 0.4);
+  step(0.9);
+  expect_at(0, 1, 0.5);
+  const modar_event events[] = {{sizeof events[0], MODAR_SEEN, 0, 0, 0},
+                                {sizeof events[0], MODAR_TAP, 0, 0, 0}};
+  EXPECT_EQ(modar_screen_step(screen_, 1.0, events, 2), 0u) << "nothing for the app to do";
+  EXPECT_EQ(modar_clip_playing(screen_, 0), 1u);
+  expect_at(0, 1, 0.5);
+  step(1.5);
+  step(2.6);
+  expect_at(0, 0, 0.6);
+  step(3.1);
+  EXPECT_EQ(modar_clip_playing(screen_, 0), 0u);
+  step(9);
+  expect_at(0, 0, 0.1);
+}
+
+TEST(ClipActionRuleTest, NamesAClipOfItsModel) {
+  const auto opens = [](const BundleContent& content) {
+    const auto bytes = encode(content);
+    modar_bundle* bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), nullptr);
+    modar_bundle_close(bundle);
+    return bundle != nullptr;
+  };
+  BundleContent content = acting_model();
+  EXPECT_TRUE(opens(content));
+  content.actions[0].address = content.intern("jump");
+  EXPECT_FALSE(opens(content));
+  content = acting_model();
+  content.actions[2].address = content.intern("walk");
+  EXPECT_FALSE(opens(content)) << "nothing is played";
 }
 
 TEST_F(ClipScreenTest, AllocatesNothingAFrame) {

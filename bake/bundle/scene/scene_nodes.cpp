@@ -85,7 +85,10 @@ Result<void> check_command(const ActionRequest& action, const NodeSource& target
       action.command == ActionCommand::kPlay || action.command == ActionCommand::kPause;
   if (play && target.kind != NodeKind::kVideo && target.kind != NodeKind::kSound) {
     return cannot(action, "is not a video or sound",
-                  "name one, [[scene.video]] or [[scene.sound]]");
+                  "name one, [[scene.video]] or [[scene.sound]], or write play CLIP on MODEL");
+  }
+  if (action.command >= ActionCommand::kClip && target.kind != NodeKind::kModel) {
+    return cannot(action, "is not a model", "name a model, which has clips");
   }
   if (!play && target.kind == NodeKind::kSound) {
     return cannot(action, "is a sound, which only plays and pauses", "write play or pause");
@@ -324,6 +327,7 @@ class NodeMaker {
       MODAR_TRY(check_part(request, content_.nodes[action.source]));
       action.part = content_.intern(request.part);
     }
+    if (plays_clip(action.command)) MODAR_TRY(check_clip(request, content_.nodes[action.target]));
     action.address = content_.intern(request.address);
     action.seconds = static_cast<float>(request.seconds);
     if (request.command == ActionCommand::kTurn) {
@@ -333,6 +337,18 @@ class NodeMaker {
     }
     content_.actions.push_back(action);
     return {};
+  }
+
+  [[nodiscard]] Result<void> check_clip(const ActionRequest& action, const NodeRecord& node) const {
+    std::string names;
+    for (const ClipRecord& clip : content_.clips) {
+      if (clip.model != content_.scenes[node.subject].model) continue;
+      const std::string name = content_.names.substr(clip.name.offset, clip.name.length);
+      if (name == action.address) return {};
+      names += (names.empty() ? "" : ", ") + name;
+    }
+    return cannot(action, "has no clip '" + action.address + "'",
+                  names.empty() ? "its file has no animation" : "name one of " + names);
   }
 
   [[nodiscard]] Result<void> check_part(const ActionRequest& action, const NodeRecord& node) const {

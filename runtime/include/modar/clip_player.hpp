@@ -52,7 +52,9 @@ class ClipPlayer {
   /// The next pose is another one.
   [[nodiscard]] bool moves() const { return stale_ || now_.moves || blended_s_ < blend_s_; }
   /// Of bones_of() the model; empty before the first play(): the rest pose.
-  [[nodiscard]] std::span<const BoneMatrix> bones() const { return posed_ ? bones_ : kRest; }
+  [[nodiscard]] std::span<const BoneMatrix> bones() const {
+    return {matrices_.data() + joints_.count, posed_ ? bone_range_.count : 0};
+  }
 
  private:
   struct Place {
@@ -61,31 +63,30 @@ class ClipPlayer {
     float scale[3];
   };
   struct Layer {
-    std::uint32_t clip = kNone;  ///< kNone: the pose of held_
+    std::uint32_t clip = kNone;  ///< kNone: the pose of kHeld
     double time = 0;             ///< seconds of the clip
     bool loops = false;
     bool moves = false;
-    std::vector<std::uint32_t> keys;  ///< that were found last, one a track
+    std::uint32_t keys = 0;  ///< where in keys_ those that were found last begin
   };
+  /// Places of all joints, one set behind the other.
+  enum Set : std::uint32_t { kRest, kHeld, kNow, kBefore, kSets };
 
+  [[nodiscard]] Place* set(Set which) { return places_.data() + which * joints_.count; }
+  void copy(Set from, Set to);
   void move(Layer& layer, double seconds) const;
-  void sample(Layer& layer, std::vector<Place>& places);
+  void sample(const Layer& layer, Set to);
   void blend(float share);
   void compose();
-
-  static constexpr std::span<const BoneMatrix> kRest{};
 
   BundleView bundle_;
   RecordRange joints_;
   RecordRange clips_;
   RecordRange bone_range_;
   std::vector<ClipTracksView> tracks_;  ///< one a clip
-  std::vector<Place> rest_;
-  std::vector<Place> held_;
-  std::vector<Place> places_;
-  std::vector<Place> others_;  ///< of before_
-  std::vector<BoneMatrix> to_model_;
-  std::vector<BoneMatrix> bones_;
+  std::vector<std::uint32_t> keys_;
+  std::vector<Place> places_;         ///< kSets
+  std::vector<BoneMatrix> matrices_;  ///< of joints to model space, then of bones
   Layer now_;
   Layer before_;
   double blend_s_ = 0;

@@ -64,11 +64,13 @@ class ScreenMachine {
   struct Motion {
     ClipPlayer player;
     bool begun = false;  ///< its pattern was seen
+    bool fresh = false;  ///< the app has begun a clip since the last step
     bool seen = false;   ///< in the last step
   };
 
   void limit();
-  void step_clips(double time_s, std::span<const SceneEvent> events);
+  void act_clip(const ActionRecord& action);
+  void step_clips(std::span<const SceneEvent> events);
   void begin_clip(std::uint32_t scene);
   [[nodiscard]] bool shows(const SceneEvent& event, std::uint32_t scene) const;
 
