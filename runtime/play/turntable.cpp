@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include <glm/ext/matrix_transform.hpp>
@@ -88,6 +89,20 @@ Subject model_subject(const BundleView& bundle, std::uint32_t model) {
           {on_turntable(stand, model, glm::mat4(1.0f))}};
 }
 
+/// Plays the clip of the model's scene, or its first one; nothing where it has none.
+void begin_clip(const BundleView& bundle, std::uint32_t model, std::optional<ClipPlayer>& player) {
+  const std::uint32_t scene = stand_of(bundle, model).scene;
+  std::uint32_t clip = 0;
+  while (clip < bundle.clips().size() && bundle.clips()[clip].model != model) ++clip;
+  for (const SceneClipRecord& record : bundle.scene_clips()) {
+    if (record.scene == scene) clip = record.clip;
+  }
+  if (clip == bundle.clips().size()) return;
+  player.emplace(bundle, model);
+  player->play(clip, true, 0);
+  player->pose();
+}
+
 /// The first pictures of a pattern, videos with their posters.
 Subject pattern_subject(const BundleView& bundle, std::uint32_t pattern) {
   Subject subject{bundle.name(bundle.patterns()[pattern].name), 0, {}};
@@ -133,12 +148,15 @@ Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle
     const double distance = distance_of(camera, subject.radius);
     turn.name = subject.name;
     std::vector<DrawItem> items = subject.items;
+    std::optional<ClipPlayer> player;
+    if (models) begin_clip(bundle, n, player);
     for (int i = 0; i < options.turntable; ++i) {
       turn.angle_deg = 360.0 * i / options.turntable;
       const glm::mat4 view = turned(turn.angle_deg, distance);
       for (std::size_t k = 0; k < items.size(); ++k) {
         items[k].to_eye = view * subject.items[k].to_eye;
         items[k].world_to_eye = view * subject.items[k].world_to_eye;
+        if (player) items[k].bones = player->bones().data();
       }
       const std::int64_t before = now_ns();
       screen->draw({}, camera, items);
@@ -154,6 +172,9 @@ Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle
         MODAR_TRY(print_line(turntable_line(turn)));
       }
       ++turn.frame;
+      if (!player) continue;
+      player->advance(1 / kFps);
+      player->pose();
     }
   }
   return sink->finish("");
