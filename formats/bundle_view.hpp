@@ -14,15 +14,35 @@
 
 namespace modar {
 
-/// Records of a table section; steps by the file's stride so that longer, newer records still read.
-template <class T>
-class Table {
+/// A Table of records of any type.
+class TableBytes {
  public:
-  Table() = default;
-  Table(const std::byte* first, std::uint32_t count, std::uint32_t stride)
+  TableBytes() = default;
+  TableBytes(const std::byte* first, std::uint32_t count, std::uint32_t stride)
       : first_(first), count_(count), stride_(stride) {}
   [[nodiscard]] std::uint32_t size() const { return count_ + more_count_; }
   [[nodiscard]] bool empty() const { return size() == 0; }
+  /// Continues with the records of another section.
+  void append(const TableBytes& more) {
+    more_ = more.first_;
+    more_count_ = more.count_;
+    more_stride_ = more.stride_;
+  }
+
+ protected:
+  const std::byte* first_ = nullptr;
+  const std::byte* more_ = nullptr;
+  std::uint32_t count_ = 0;
+  std::uint32_t more_count_ = 0;
+  std::uint32_t stride_ = 0;
+  std::uint32_t more_stride_ = 0;
+};
+
+/// Records of a table section; steps by the file's stride so that longer, newer records still read.
+template <class T>
+class Table : public TableBytes {
+ public:
+  using TableBytes::TableBytes;
   /// index < size(); the record lives as long as the mapped bytes.
   [[nodiscard]] const T& operator[](std::uint32_t index) const {
     const std::byte* at = index < count_ ? first_ + std::size_t{index} * stride_
@@ -48,22 +68,8 @@ class Table {
   [[nodiscard]] Iterator begin() const { return {*this, 0}; }
   [[nodiscard]] Iterator end() const { return {*this, size()}; }
 
-  /// Continues with the records of another section.
-  void append(const Table& more) {
-    more_ = more.first_;
-    more_count_ = more.count_;
-    more_stride_ = more.stride_;
-  }
   /// Without appended parts.
   [[nodiscard]] Table own() const { return {first_, count_, stride_}; }
-
- private:
-  const std::byte* first_ = nullptr;
-  const std::byte* more_ = nullptr;
-  std::uint32_t count_ = 0;
-  std::uint32_t more_count_ = 0;
-  std::uint32_t stride_ = sizeof(T);
-  std::uint32_t more_stride_ = sizeof(T);
 };
 
 /// The byte of a layout's vertices that holds occlusion, or kNone.

@@ -160,12 +160,24 @@ bool find_header(FaultLog& log, const BundleParts& parts, SectionType type, std:
   return true;
 }
 
+/// A table section and where it goes.
+struct TableSlot {
+  SectionType type;
+  std::uint32_t size;  ///< bytes of a record
+  TableBytes* table;
+};
+
 template <class T>
-bool find_table(FaultLog& log, const BundleParts& parts, SectionType type, Table<T>& table) {
+TableSlot slot(SectionType type, Table<T>& table) {
+  return {type, sizeof(T), &table};
+}
+
+bool find_table(FaultLog& log, const BundleParts& parts, const TableSlot& slot) {
   const TableHeader* header = nullptr;
-  if (!find_header(log, parts, type, sizeof(T), header)) return false;
+  if (!find_header(log, parts, slot.type, slot.size, header)) return false;
   if (header != nullptr) {
-    table = Table<T>(reinterpret_cast<const std::byte*>(header + 1), header->count, header->stride);
+    *slot.table =
+        TableBytes(reinterpret_cast<const std::byte*>(header + 1), header->count, header->stride);
   }
   return true;
 }
@@ -252,32 +264,36 @@ bool validate_tables(FaultLog& log, BundleParts& parts) {
   parts.vertices = blob(SectionType::kVertices);
   parts.indices = blob(SectionType::kIndices);
   check_names(log, parts);
-  bool walkable = find_table(log, parts, SectionType::kModels, parts.models);
-  walkable &= find_table(log, parts, SectionType::kChunks, parts.chunks);
-  walkable &= find_table(log, parts, SectionType::kLevels, parts.levels);
-  walkable &= find_table(log, parts, SectionType::kMaterials, parts.materials);
-  walkable &= find_table(log, parts, SectionType::kLayouts, parts.layouts);
-  walkable &= find_table(log, parts, SectionType::kTextures, parts.textures);
-  walkable &= find_table(log, parts, SectionType::kTextureLevels, parts.texture_levels);
-  walkable &= find_table(log, parts, SectionType::kPatterns, parts.patterns);
-  walkable &= find_table(log, parts, SectionType::kParameterSets, parts.parameter_sets);
-  walkable &= find_table(log, parts, SectionType::kScenes, parts.scenes);
-  walkable &= find_table(log, parts, SectionType::kLights, parts.lights);
-  walkable &= find_table(log, parts, SectionType::kOcclusion, parts.occlusion);
-  walkable &= find_table(log, parts, SectionType::kNodes, parts.nodes);
-  walkable &= find_table(log, parts, SectionType::kActions, parts.actions);
-  walkable &= find_table(log, parts, SectionType::kMedia, parts.media);
-  walkable &= find_table(log, parts, SectionType::kProxies, parts.proxies);
-  walkable &= find_table(log, parts, SectionType::kClips, parts.clips);
-  walkable &= find_table(log, parts, SectionType::kJoints, parts.joints);
-  walkable &= find_table(log, parts, SectionType::kBones, parts.bones);
-  walkable &= find_table(log, parts, SectionType::kParts, parts.parts);
-  walkable &= find_table(log, parts, SectionType::kSceneClips, parts.scene_clips);
   Table<ChunkRecord> chunks;
-  walkable &= find_table(log, parts, SectionType::kProxyChunks, chunks);
-  parts.chunks.append(chunks);
   Table<LevelRecord> levels;
-  walkable &= find_table(log, parts, SectionType::kProxyLevels, levels);
+  const TableSlot slots[] = {
+      slot(SectionType::kModels, parts.models),
+      slot(SectionType::kChunks, parts.chunks),
+      slot(SectionType::kLevels, parts.levels),
+      slot(SectionType::kMaterials, parts.materials),
+      slot(SectionType::kLayouts, parts.layouts),
+      slot(SectionType::kTextures, parts.textures),
+      slot(SectionType::kTextureLevels, parts.texture_levels),
+      slot(SectionType::kPatterns, parts.patterns),
+      slot(SectionType::kParameterSets, parts.parameter_sets),
+      slot(SectionType::kScenes, parts.scenes),
+      slot(SectionType::kLights, parts.lights),
+      slot(SectionType::kOcclusion, parts.occlusion),
+      slot(SectionType::kNodes, parts.nodes),
+      slot(SectionType::kActions, parts.actions),
+      slot(SectionType::kMedia, parts.media),
+      slot(SectionType::kProxies, parts.proxies),
+      slot(SectionType::kClips, parts.clips),
+      slot(SectionType::kJoints, parts.joints),
+      slot(SectionType::kBones, parts.bones),
+      slot(SectionType::kParts, parts.parts),
+      slot(SectionType::kSceneClips, parts.scene_clips),
+      slot(SectionType::kProxyChunks, chunks),
+      slot(SectionType::kProxyLevels, levels),
+  };
+  bool walkable = true;
+  for (const TableSlot& each : slots) walkable &= find_table(log, parts, each);
+  parts.chunks.append(chunks);
   parts.levels.append(levels);
   return walkable && !log.stop();
 }

@@ -162,7 +162,7 @@ void ClipPlayer::move(Layer& layer, double seconds) const {
   layer.time += seconds;
   if (layer.time < length) return;
   layer.moves = layer.loops && length > 0;
-  layer.time = layer.moves ? std::fmod(layer.time, length) : length;
+  layer.time = layer.moves ? layer.time - length * std::floor(layer.time / length) : length;
 }
 
 void ClipPlayer::advance(double seconds) {

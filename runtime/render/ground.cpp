@@ -6,7 +6,7 @@
 #include <cstring>
 #include <utility>
 
-#include <glm/matrix.hpp>
+#include <glm/gtc/matrix_inverse.hpp>
 
 #include "runtime/render/program.hpp"
 
@@ -24,8 +24,10 @@ const ShadowHeader& header_of(std::span<const std::byte> section) {
 /// The shadow goes with the model where a visitor has turned, moved or enlarged that, and stays in
 /// the plane.
 glm::mat4 shadow_to_eye(const DrawItem& item, const SceneRecord& scene) {
-  glm::mat4 moved =
-      glm::inverse(item.world_to_eye) * item.to_eye * glm::inverse(scene_matrix(scene));
+  // In double precision, as others invert matrices: one function fewer.
+  const glm::dmat4 to_world = glm::affineInverse(glm::dmat4(item.world_to_eye));
+  const glm::dmat4 to_model = glm::affineInverse(glm::dmat4(scene_matrix(scene)));
+  glm::mat4 moved(to_world * glm::dmat4(item.to_eye) * to_model);
   for (int column = 0; column < 4; ++column) moved[column][2] = 0.0f;
   return item.world_to_eye * moved;
 }

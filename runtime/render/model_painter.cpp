@@ -148,12 +148,13 @@ Result<void> ModelPainter::create(const TextureStore& textures, const GlExtensio
       key.cut_out = key.alpha_twin && material.opacity >= 1.0f &&
                     (bundle_.textures()[material.texture].flags & kTextureCutOut) != 0;
       key.shiny = shines(material) || glows(material) || mirrors(material);
-      MODAR_ASSIGN(const std::uint32_t program, program_of(key));
-      setups_[c].program = program;
       setups_[c].part = part_of(bundle_, bundle_.chunks()[c].material);
-      if (setups_[c].part != kNone && bundle_.moving_parts()[setups_[c].part].bone_count > 1) {
-        key.skinned = true;
-        MODAR_ASSIGN(setups_[c].skinned, program_of(key));
+      const bool bends =
+          setups_[c].part != kNone && bundle_.moving_parts()[setups_[c].part].bone_count > 1;
+      for (const bool skinned : {false, true}) {
+        key.skinned = skinned;
+        if (skinned && !bends) continue;
+        MODAR_ASSIGN((skinned ? setups_[c].skinned : setups_[c].program), program_of(key));
       }
       setups_[c].material = equal_material_[bundle_.chunks()[c].material];
       setups_[c].hides = (material.flags & kMaterialOccluder) != 0;

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include <glm/geometric.hpp>
+#include <glm/gtc/matrix_inverse.hpp>
 #include <glm/matrix.hpp>
 
 #include "formats/component.hpp"
@@ -126,7 +127,7 @@ std::optional<Pick> pick(const BundleView& bundle, const Camera& camera, glm::dv
   for (std::size_t i = 0; i < items.size(); ++i) {
     const bool picture = is_picture(bundle, items[i].node);
     if (!picture && items[i].model >= bundle.models().size()) continue;
-    const glm::dmat4 to_model = glm::inverse(glm::dmat4(items[i].to_eye));
+    const glm::dmat4 to_model = glm::affineInverse(glm::dmat4(items[i].to_eye));
     const Ray ray{glm::dvec3(to_model[3]), glm::dmat3(to_model) * direction};
     const ModelRecord none{};
     const ModelRecord& model = picture ? none : bundle.models()[items[i].model];

@@ -249,14 +249,19 @@ BundleContent chain_content() {
   BundleContent content;
   content.meta = "{}";
   LayoutRecord layout{};
-  layout.stride = 12;
-  layout.attribute_count = 1;
-  layout.attributes[0] = {static_cast<std::uint8_t>(Semantic::kPosition),
-                          static_cast<std::uint8_t>(ComponentType::kF32),
-                          3,
-                          0,
-                          0,
-                          0};
+  layout.stride = 20;
+  const auto add = [&](Semantic semantic, ComponentType type, std::uint8_t components,
+                       std::uint8_t normalised, std::uint16_t offset) {
+    layout.attributes[layout.attribute_count++] = {static_cast<std::uint8_t>(semantic),
+                                                   static_cast<std::uint8_t>(type),
+                                                   components,
+                                                   normalised,
+                                                   offset,
+                                                   0};
+  };
+  add(Semantic::kPosition, ComponentType::kF32, 3, 0, 0);
+  add(Semantic::kJoints, ComponentType::kU8, 4, 0, 12);
+  add(Semantic::kWeights, ComponentType::kU8, 4, 1, 16);
   content.layouts.push_back(layout);
   ModelRecord model{};
   model.name = content.intern("chain");
