@@ -71,18 +71,17 @@ std::array<std::uint16_t, 3> pack_rotation(const std::array<double, 4>& rotation
 }
 
 TrackValue unpack_rotation(const std::array<std::uint16_t, 3>& words) {
-  const std::uint64_t bits =
-      words[0] | std::uint64_t{words[1]} << 16 | std::uint64_t{words[2]} << 32;
-  const std::size_t largest = bits & 3u;
+  const std::uint32_t low = words[0] | std::uint32_t{words[1]} << 16;
+  const std::uint32_t steps[3] = {low >> 2 & 0x7FFFu, low >> 17, words[2] & 0x7FFFu};
+  const std::size_t largest = low & 3u;
   TrackValue value{};
   float rest = 1;
-  int shift = 2;
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (i == largest) continue;
-    const auto step = static_cast<float>(bits >> shift & 0x7FFFu);
-    value[i] = (step * static_cast<float>(2 / kPartSteps) - 1) * static_cast<float>(kMostPart);
-    rest -= value[i] * value[i];
-    shift += 15;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto step = static_cast<float>(steps[i]);
+    const float part =
+        (step * static_cast<float>(2 / kPartSteps) - 1) * static_cast<float>(kMostPart);
+    value[i < largest ? i : i + 1] = part;
+    rest -= part * part;
   }
   value[largest] = std::sqrt(std::max(rest, 0.0f));
   return value;

@@ -107,22 +107,17 @@ ClipPlayer::ClipPlayer(const BundleView& bundle, std::uint32_t model)
       joints_(run_of(bundle.joints(), model)),
       clips_(run_of(bundle.clips(), model)),
       bone_range_(bones_of(bundle, model)) {
-  std::size_t most = 0;
-  for (std::uint32_t i = 0; i < clips_.count; ++i) {
-    tracks_.push_back(bundle.clip_tracks(clips_.first + i));
-    most = std::max(most, tracks_.back().tracks.size());
-  }
+  const std::uint32_t most = 3 * joints_.count;  // a track a path
   keys_.resize(2 * most);
-  before_.keys = static_cast<std::uint32_t>(most);
-  places_.resize(std::size_t{kSets} * joints_.count);
+  before_.keys = most;
+  numbers_.resize(kPlaceFloats * joints_.count + 12 * (joints_.count + bone_range_.count));
   for (std::uint32_t i = 0; i < joints_.count; ++i) {
     const JointRecord& joint = bundle.joints()[joints_.first + i];
-    Place& place = places_[i];
+    Place& place = set(kRest)[i];
     std::copy_n(joint.translation, 3, place.translation);
     std::copy_n(joint.rotation, 4, place.rotation);
     std::copy_n(joint.scale, 3, place.scale);
   }
-  matrices_.resize(joints_.count + bone_range_.count);
   reset();
 }
 
@@ -148,6 +143,7 @@ bool ClipPlayer::play(std::uint32_t clip, bool loops, double blend_s) {
   }
   std::swap(now_, before_);
   now_.clip = clip;
+  now_.tracks = bundle_.clip_tracks(clip);
   now_.time = 0;
   now_.loops = loops;
   now_.moves = posed_ = stale_ = true;
@@ -187,9 +183,8 @@ void ClipPlayer::pose() {
 void ClipPlayer::sample(const Layer& layer, Set to) {
   const bool holds = layer.clip == kNone;
   copy(holds ? kHeld : kRest, to);
-  const ClipTracksView none;
-  const ClipTracksView& view = holds ? none : tracks_[layer.clip - clips_.first];
-  if (view.tracks.empty()) return;
+  const ClipTracksView& view = layer.tracks;
+  if (holds || view.tracks.empty()) return;
   const auto length = static_cast<double>(bundle_.clips()[layer.clip].seconds);
   const auto last = static_cast<double>(view.header->sample_count - 1);
   const auto time = static_cast<float>(length > 0 ? layer.time / length * last : 0);
@@ -231,6 +226,8 @@ void ClipPlayer::blend(float share) {
 }
 
 void ClipPlayer::compose() {
+  auto* const matrices =
+      reinterpret_cast<BoneMatrix*>(numbers_.data() + kPlaceFloats * joints_.count);
   const Table<JointRecord> joints = bundle_.joints();
   for (std::uint32_t j = 0; j < joints_.count; ++j) {
     const JointRecord& joint = joints[joints_.first + j];
@@ -238,14 +235,14 @@ void ClipPlayer::compose() {
     const BoneMatrix own = times(glm::make_mat3x4(joint.before),
                                  matrix_of(place.translation, place.rotation, place.scale));
     const std::uint32_t parent = joint.parent - joints_.first;
-    matrices_[j] = joint.parent != kNone && parent < j ? times(matrices_[parent], own) : own;
+    matrices[j] = joint.parent != kNone && parent < j ? times(matrices[parent], own) : own;
   }
   const Table<BoneRecord> bones = bundle_.bones();
   for (std::uint32_t b = 0; b < bone_range_.count; ++b) {
     const BoneRecord& bone = bones[bone_range_.first + b];
     const std::uint32_t joint = bone.joint - joints_.first;
     if (joint < joints_.count)
-      matrices_[joints_.count + b] = times(matrices_[joint], glm::make_mat3x4(bone.inverse));
+      matrices[joints_.count + b] = times(matrices[joint], glm::make_mat3x4(bone.inverse));
   }
 }
 

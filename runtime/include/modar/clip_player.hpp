@@ -53,7 +53,9 @@ class ClipPlayer {
   [[nodiscard]] bool moves() const { return stale_ || now_.moves || blended_s_ < blend_s_; }
   /// Of bones_of() the model; empty before the first play(): the rest pose.
   [[nodiscard]] std::span<const BoneMatrix> bones() const {
-    return {matrices_.data() + joints_.count, posed_ ? bone_range_.count : 0};
+    if (!posed_) return {};
+    const float* const first = numbers_.data() + (kPlaceFloats + 12) * joints_.count;
+    return {reinterpret_cast<const BoneMatrix*>(first), bone_range_.count};
   }
 
  private:
@@ -68,11 +70,15 @@ class ClipPlayer {
     bool loops = false;
     bool moves = false;
     std::uint32_t keys = 0;  ///< where in keys_ those that were found last begin
+    ClipTracksView tracks;
   };
   /// Places of all joints, one set behind the other.
   enum Set : std::uint32_t { kRest, kHeld, kNow, kBefore, kSets };
+  static constexpr std::uint32_t kPlaceFloats = kSets * sizeof(Place) / sizeof(float);
 
-  [[nodiscard]] Place* set(Set which) { return places_.data() + which * joints_.count; }
+  [[nodiscard]] Place* set(Set which) {
+    return reinterpret_cast<Place*>(numbers_.data()) + which * joints_.count;
+  }
   void copy(Set from, Set to);
   void move(Layer& layer, double seconds) const;
   void sample(const Layer& layer, Set to);
@@ -83,10 +89,8 @@ class ClipPlayer {
   RecordRange joints_;
   RecordRange clips_;
   RecordRange bone_range_;
-  std::vector<ClipTracksView> tracks_;  ///< one a clip
   std::vector<std::uint32_t> keys_;
-  std::vector<Place> places_;         ///< kSets
-  std::vector<BoneMatrix> matrices_;  ///< of joints to model space, then of bones
+  std::vector<float> numbers_;  ///< kSets of places; matrices of joints, then of bones
   Layer now_;
   Layer before_;
   double blend_s_ = 0;
