@@ -686,7 +686,7 @@ MODAR_EXPERIMENTAL void modar_clip_stop(modar_screen* screen, uint32_t scene);
 /* Number of the clip that moves a scene's model, its index + 1; 0: none does, or it has ended. */
 MODAR_EXPERIMENTAL uint32_t modar_clip_playing(const modar_screen* screen, uint32_t scene);
 /* The pose of a scene's model in the last step in which its pattern was seen: 12 floats a bone, the
- * rows of a matrix from the model as it was baked to its pose. Copies at most `capacity` floats;
+ * rows of a matrix from the baked model to its pose. Copies at most `capacity` floats;
  * returns how many there are, 0 before a clip was played. */
 MODAR_EXPERIMENTAL size_t modar_clip_bones(const modar_screen* screen, uint32_t scene, float* rows,
                                            size_t capacity);
