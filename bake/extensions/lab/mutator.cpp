@@ -86,6 +86,10 @@ const char* semantic_name(std::uint8_t semantic) {
       return "vertex colour";
     case Semantic::kNormalOct:
       return "vertex octahedral normal";
+    case Semantic::kJoints:
+      return "vertex bones";
+    case Semantic::kWeights:
+      return "vertex weights";
   }
   return "vertex";
 }
