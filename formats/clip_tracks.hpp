@@ -13,7 +13,7 @@ namespace modar {
 inline constexpr std::uint32_t kClipRate = 120;  ///< samples in a second
 inline constexpr std::uint32_t kMaxClipSamples =
     65536;  ///< nine minutes; keys count them in 16 bits
-/// Vertex uniforms hold three vec4 a bone; 32 of ES 2.0's 128 remain for the rest of the program.
+/// Three vec4 of vertex uniforms each; the rest of ES 2.0's 128 is the program's.
 inline constexpr std::uint32_t kMostPartBones = 32;
 inline constexpr std::uint32_t kMaxJoints = 4096;  ///< of a bundle
 inline constexpr std::uint32_t kMaxClipTracks = 3 * kMaxJoints;

@@ -157,6 +157,7 @@ void detection(JsonText& writer, const Detection& seen, std::span<const std::str
 
 /// In pixels of the file, of a frame that was reduced.
 FrameReport in_file(FrameReport report) {
+  if (report.reduced == 1) return report;  // to the last bit
   for (Detection& seen : report.visible) {
     for (glm::dvec2& corner : seen.corners) corner = report.reduced * (corner + 0.5) - 0.5;
   }

@@ -28,6 +28,15 @@ Bytes summarised_bundle() {
   return encode(content);
 }
 
+/// Moving models have no proxies.
+Bytes moving_bundle() {
+  BundleContent content = golden_content();
+  add_looks(content);
+  add_clips(content);
+  content.summary = content_summary_of(content);
+  return encode(content);
+}
+
 TEST(Mutate, ReachesItsGoals) {
   MutateOptions options;
   options.count = modar::testing::soak() ? 100000 : 6000;
@@ -54,15 +63,18 @@ TEST(Mutate, ReachesItsGoals) {
 }
 
 TEST(Mutate, SpreadsOverEveryFieldOfTheSpecification) {
-  const Bytes bytes = summarised_bundle();
-  const auto view = BundleView::open(bytes);
-  ASSERT_TRUE(view);
   std::set<std::string> names;
-  for (const MutationField& field : mutation_fields(*view)) {
-    EXPECT_TRUE(names.insert(field.name).second) << field.name;
-    EXPECT_GT(field.elements(), 0u) << field.name;
-    const std::size_t size = field_element_bytes(field.type);
-    EXPECT_LE(field.place(field.elements() - 1) + size, bytes.size()) << field.name;
+  for (const Bytes& bytes : {summarised_bundle(), moving_bundle()}) {
+    const auto view = BundleView::open(bytes);
+    ASSERT_TRUE(view);
+    std::set<std::string> own;
+    for (const MutationField& field : mutation_fields(*view)) {
+      EXPECT_TRUE(own.insert(field.name).second) << field.name;
+      EXPECT_GT(field.elements(), 0u) << field.name;
+      const std::size_t size = field_element_bytes(field.type);
+      EXPECT_LE(field.place(field.elements() - 1) + size, bytes.size()) << field.name;
+    }
+    names.merge(own);
   }
   for (const RecordInfo& record : record_infos()) {
     for (const FieldInfo& field : record.fields) {

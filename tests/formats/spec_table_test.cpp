@@ -229,7 +229,7 @@ TEST(SpecTable, ConstantsAreTheSpecifiedOnes) {
     if (row.size() == 6 && std::isdigit(row[0][0]) != 0)
       rows[static_cast<unsigned>(std::stoul(row[0]))] = row;
   }
-  const char* const owners[] = {"NONE", "pattern", "scene", "chunk", "texture", "media"};
+  const char* const owners[] = {"NONE", "pattern", "scene", "chunk", "texture", "media", "clip"};
   EXPECT_EQ(rows.size(), modar::kSections.size());
   for (const modar::SectionInfo& section : modar::kSections) {
     const auto& row = rows[static_cast<unsigned>(section.type)];

@@ -11,7 +11,7 @@
 namespace modar::test {
 namespace {
 
-/// 15 bits of a quaternion and 16 of a range of 4, through three joints.
+/// Packed quaternions and ranges, through several joints; model space.
 constexpr double kPackedError = 3e-4;
 
 void expect_bones(std::span<const BoneMatrix> bones, const std::vector<JointState>& states) {

@@ -159,6 +159,16 @@ void add_shape(Collector& out, const BundleView& bundle, const SectionEntry& ent
                   sizeof(ShapeFaceRecord), header.face_count);
 }
 
+void add_tracks(Collector& out, const BundleView& bundle, const SectionEntry& entry) {
+  const auto& header =
+      *reinterpret_cast<const ClipTracksHeader*>(bundle.bytes().data() + entry.offset);
+  const std::uint64_t keys = sizeof header + header.track_count * sizeof(TrackRecord);
+  out.add_records(record_info("ClipTracksHeader"), entry.offset, sizeof header, 1);
+  out.add_records(record_info("TrackRecord"), entry.offset + sizeof header, sizeof(TrackRecord),
+                  header.track_count);
+  out.add("clip keys", FieldType::kU16, {entry.offset + keys, 2, (entry.size - keys) / 2});
+}
+
 void add_shadow(Collector& out, const SectionEntry& entry) {
   out.add_records(record_info("ShadowHeader"), entry.offset, sizeof(ShadowHeader), 1);
   out.add("shadow texel", FieldType::kU8,
@@ -203,6 +213,8 @@ void add_section(Collector& out, const BundleView& bundle, const SectionEntry& e
           *reinterpret_cast<const FeatureHeader*>(bundle.bytes().data() + entry.offset));
     case SectionType::kShadow:
       return add_shadow(out, entry);
+    case SectionType::kClipTracks:
+      return add_tracks(out, bundle, entry);
     default:
       return;
   }
