@@ -22,7 +22,7 @@ SCENES = [
     '[[scene]]\npattern="a"\nmodel="pottery"\ntext = { en = "x", de = "]}#" }\nname = "second"\nscale = 1\n',
     '[[scene]]\npattern = "b"\nmodel = "pottery"\nname = """three\nlines = 1"""\n',
 ]
-VALUES = [("turn", 45), ("turn", [0, 12.5, -90]), ("offset", [1e-7, -3, 2.25]), ("up", "-y"), ("scale", 0.8), ("height", "120mm"),
+VALUES = [("turn", 45), ("turn", [0, 12.5, -90]), ("offset", [1e-7, -3, 2.25]), ("up", "-y"), ("clip", "walk"), ("scale", 0.8), ("height", "120mm"),
           ("text.en", "<script>alert('x')</script>"), ("text.he", "\u05db\u05d3 \u202eabc"), ("text.de", "\U0001f3fa \"quoted\" \\ back\n\ttab"),
           ("alt.en", ""), ("hidden", True), ("group", "a.b#c"), ("light", None)]
 

@@ -134,6 +134,7 @@ Json scene_json(const ProjectScene& scene) {
           {"size", Json{{"kind", kSizes[static_cast<std::size_t>(request.size.kind)]},
                         {"value", request.size.value}}},
           {"up", request.up ? Json(up_axis_name(*request.up)) : Json()},
+          {"clip", request.clip.empty() ? Json() : Json(request.clip)},
           {"centred", request.centred},
           {"hidden", request.hidden},
           {"group", request.group},
@@ -268,7 +269,7 @@ Result<Json> project_view(Session& session) {
   for (const ProjectAsset& model : project.models) {
     Json json = asset_json(session, model, model_sizes);
     json.set("missing", Json::list(missing_of(session, model.file)));
-    add_facts(json, facts.models, model.name, {"triangles", "size", "up", "repair"});
+    add_facts(json, facts.models, model.name, {"triangles", "size", "up", "repair", "clips"});
     models.push_back(std::move(json));
   }
   for (const ProjectAsset& pattern : project.patterns) {

@@ -215,12 +215,17 @@ Json model_facts(const BundleView& bundle, const Json& stated, std::uint32_t ind
   for (std::size_t axis = 0; axis < 3; ++axis) {
     size.push_back(model.scale * (most[axis] - least[axis]));
   }
+  Json clips = Json::array();
+  for (const ClipRecord& clip : bundle.clips()) {
+    if (clip.model == index) clips.push_back(std::string(bundle.name(clip.name)));
+  }
   const auto upright = upright_in(stated, index);
   const auto repair = stated_repair(bundle, index);
   return {{"triangles", model.triangle_count},
           {"size", std::move(size)},
           {"up", upright ? Json(up_axis_name(upright->axis)) : Json()},
-          {"repair", repair ? defects_json(*repair) : Json()}};
+          {"repair", repair ? defects_json(*repair) : Json()},
+          {"clips", std::move(clips)}};
 }
 
 Json pattern_facts(const BundleView& bundle, const Json& stated, std::uint32_t index) {

@@ -302,6 +302,29 @@ export class Scene {
   }
 
   /**
+   * Which of the model's animations plays; the first one, unless another is chosen.
+   * @param {Studio.Placed} scene
+   */
+  clipField(scene) {
+    const clips = scene.asset?.clips ?? [];
+    if (!clips.length) return null;
+    const chosen = scene.clip ?? clips[0];
+    return m(
+        'div.field',
+        m('label',
+          { for: 'clip'
+          },
+          t('clip')),
+        m('select', {
+          id: 'clip',
+          onchange: (event) =>
+              setScene(scene, {clip: event.target.value === clips[0] ? null : event.target.value})
+        },
+          clips.map((clip) => m('option', {value: clip, selected: clip === chosen}, clip)),
+          m('option', {value: 'none', selected: chosen === 'none'}, t('clipNone'))));
+  }
+
+  /**
    * The axis that is up after one more press: all six in turn, first the one that files mean most
    * often. null: the found one.
    * @param {Studio.Placed} scene
@@ -319,7 +342,7 @@ export class Scene {
     const leans = tipped || scene.turn[0] !== 0 || scene.turn[1] !== 0;
     return [
       m('div.fields', this.sizeField(scene), this.turnField(scene, 2)),
-      m('div.fields.three', this.offsetFields(scene)),
+      m('div.fields.three', this.offsetFields(scene)), this.clipField(scene),
       m('div.row.three',
         button(
             t('tipOver'), () => setScene(scene, {up: this.nextSide(scene)}),

@@ -50,6 +50,8 @@ declare namespace Studio {
     settings: Record<string, string>;
     /** What the bake repaired, by kind; null: nothing was requested. */
     repair: Record<string, { count: number; area: number }> | null;
+    /** Its animations; null: it was not baked. */
+    clips: string[] | null;
   }
 
   interface Pattern extends Asset {
@@ -76,6 +78,8 @@ declare namespace Studio {
     turn: Point;
     size: { kind: 'scale' | 'height' | 'width'; value: number };
     up: Axis | null;
+    /** That plays; null: the model's first, 'none': no one. */
+    clip: string | null;
     centred: boolean;
     texts: Record<string, string>;
     alts: Record<string, string>;
