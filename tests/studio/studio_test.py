@@ -431,6 +431,29 @@ class Page(StudioTest):
         self.hand.call("Input.insertText", text=text)  # a field that is empty
         self.hand.press("Tab")
 
+    def test_a_model_plays_the_animation_that_is_chosen(self):
+        self.project.mkdir()
+        picture(self.project / "cover.png")
+        moving = json.loads((ROOT / "tests/import/clips/moving.gltf").read_text())
+        moving["animations"] = [{**moving["animations"][0], "name": name} for name in ("walk", "wave")]
+        (self.project / "moving.gltf").write_text(json.dumps(moving))
+        (self.project / "modar.toml").write_text(QUICK + '[[pattern]]\nfile = "cover.png"\n\n[[model]]\nfile = "moving.gltf"\n\n[[scene]]\npattern = "cover"\nmodel = "moving"\n')
+        self.start()
+        hand = self.hand
+        hand.run("location.hash = '#/scene/cover'")
+        hand.wait("document.querySelector('.standing button')", "the list of models")
+        hand.click(".standing button")
+        hand.wait("document.querySelector('#clip')", "its animations, once it was baked")
+        self.assertEqual(hand.run("[...document.querySelector('#clip').options].map(({ value }) => value)"), ["walk", "wave", "none"])
+        self.assertEqual(hand.run("document.querySelector('#clip').value"), "walk")
+        for value, line in (("wave", 'clip = "wave"'), ("none", 'clip = "none"')):
+            hand.run("((field) => { field.value = '%s'; field.dispatchEvent(new Event('change')); })(document.querySelector('#clip'))" % value)
+            self.wait_for(line)
+        hand.run("((field) => { field.value = 'walk'; field.dispatchEvent(new Event('change')); })(document.querySelector('#clip'))")
+        hand.settle()
+        self.assertNotIn("clip", self.toml())
+        self.assert_no_errors()
+
     def test_a_scan_on_a_cup_as_a_ruler_says_it(self):
         """Lengths only. The cup is seen under the model, and its models are measured in its millimetres."""
         self.project.mkdir()
