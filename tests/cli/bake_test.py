@@ -229,13 +229,13 @@ class Bake(ProgramTest):
                        {"primitives": [{"attributes": {"POSITION": 0}, "material": 1}]}],
             "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 1}}}, {}],
             "textures": [{"source": 0}, {"source": 1}], "images": images,
-            "animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path": "scale"}}], "samplers": [{"input": 3, "output": 0}]}],
+            "animations": [{"channels": [{"sampler": 0, "target": {"node": 0, "path": path}}], "samplers": [{"input": 3, "output": 0}]} for path in ("weights", "scale")],
             "buffers": [{"byteLength": len(data), "uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode()}],
             "bufferViews": [{"buffer": 0, "byteLength": len(data)}],
             "accessors": [{**view, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]}, {**view, "type": "VEC2"}, {**view, "type": "VEC4"},
                           {**view, "type": "SCALAR"}]}))
         self.assertEqual(self.account(self.folder / "m.gltf"), {
-            "images": (1, 1, 1), "colours": (1, 0, 1), "faces": (1, 0, 0), "nodes": (1, 0, 2), "animations": (0, 0, 1), "attributes": (2, 0, 3)})
+            "images": (1, 1, 1), "colours": (1, 0, 1), "faces": (1, 0, 0), "nodes": (1, 0, 2), "animations": (1, 0, 1), "attributes": (2, 0, 3)})
 
     def test_models_only_and_patterns_only_are_legal(self):
         picture(self.folder / "picture.png")
