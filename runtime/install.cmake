@@ -23,7 +23,7 @@ install(TARGETS modar_shared EXPORT modar-targets
 install(EXPORT modar-targets NAMESPACE modar:: DESTINATION ${package_dir} COMPONENT development)
 install(DIRECTORY ${include_folders} DESTINATION ${include_dir} COMPONENT development)
 # Of formats/ only what the headers above include; tests/cli/app_test.py links every function of theirs.
-foreach(header base/error base/turn base/utf8 action_machine layout pattern_shape scene_nodes sections bundle_view transport/recipe transport/stages)
+foreach(header base/error base/turn base/utf8 action_machine layout clip_tracks clips pattern_shape scene_nodes sections bundle_view transport/recipe transport/stages)
   get_filename_component(folder formats/${header} DIRECTORY)
   install(FILES ${CMAKE_SOURCE_DIR}/formats/${header}.hpp DESTINATION ${include_dir}/${folder} COMPONENT development)
 endforeach()

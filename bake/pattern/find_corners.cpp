@@ -1050,6 +1050,47 @@ Result<FoundCorners> find_corners(const RgbaImage& photo) {
   }
 }
 
+namespace {
+
+/// Pixels between the ends of a side, across it, in layouts of programs. Higher takes photos for
+/// layouts, lower reports their frames as corners. [0.2, 0.5]
+constexpr double kDrawnOff = 0.3;
+/// Share of pixels around a figure that are edges of print. [0.0005, 0.01]
+constexpr double kPrintAround = 0.001;
+/// Gray values from a pixel to the next at an edge of print. [20, 80]
+constexpr double kPrintStep = 40;
+
+/// Sides along the pixels' rows and columns: no camera is held so.
+bool is_drawn(const std::array<Point, 4>& corners) {
+  const std::array<double, 4> off = {corners[0].y - corners[1].y, corners[3].y - corners[2].y,
+                                     corners[0].x - corners[3].x, corners[1].x - corners[2].x};
+  return std::all_of(off.begin(), off.end(), [](double one) { return std::abs(one) <= kDrawnOff; });
+}
+
+/// Text or other pictures next to the figure: both are parts of one layout.
+bool has_print_around(const RgbaImage& image, const std::array<Point, 4>& corners) {
+  if (image.pixels.empty()) return false;
+  const cv::Mat rgba(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC4,
+                     const_cast<std::uint8_t*>(image.pixels.data()));
+  cv::Mat gray;
+  cv::cvtColor(rgba, gray, cv::COLOR_RGBA2GRAY);
+  cv::Mat across;
+  cv::Mat down;
+  cv::Sobel(gray, across, CV_16S, 1, 0, 1);
+  cv::Sobel(gray, down, CV_16S, 0, 1, 1);
+  cv::Mat print = cv::abs(across) + cv::abs(down) > 2 * kPrintStep;
+  const double margin =
+      0.03 * std::max(norm_of(corners[1] - corners[0]), norm_of(corners[3] - corners[0]));
+  const cv::Rect figure = cv::Rect(cv::Point2d(corners[0].x - margin, corners[0].y - margin),
+                                   cv::Point2d(corners[2].x + margin, corners[2].y + margin)) &
+                          cv::Rect(0, 0, print.cols, print.rows);
+  print(figure) = 0;
+  const double around = static_cast<double>(print.total()) - figure.area();
+  return cv::countNonZero(print) > kPrintAround * around;
+}
+
+}  // namespace
+
 FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found) {
   const double width = photo.image.width;
   const double height = photo.image.height;
@@ -1069,6 +1110,10 @@ FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found)
   if (found->fills || !frontal || !found->clear()) picture.doubt = "";
   if (found->fills || frontal) {
     if (*picture.doubt != 0) picture.doubt = "upright";
+    return picture;
+  }
+  if (is_drawn(corners) && has_print_around(photo.image, corners)) {
+    picture.doubt = "";
     return picture;
   }
   picture.doubt = found->doubt();

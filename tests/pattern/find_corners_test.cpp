@@ -335,6 +335,29 @@ TEST(FindPicture, ASmallFigureIsAPartOfThePicture) {
   }
 }
 
+/// A picture on a label that a program laid out, with lines of text below it or without.
+Photo label(bool text, double turned) {
+  cv::Mat sheet(800, 1200, CV_8UC3, cv::Scalar(245, 245, 240));
+  cv::Mat mural = asset("mural.png");
+  cv::resize(mural, mural, cv::Size(400, 270));
+  mural.copyTo(sheet(cv::Rect(60, 80, 400, 270)));
+  for (int line = 0; text && line < 9; ++line) {
+    cv::putText(sheet, "Oil on canvas, 1888, given by a friend", {60, 440 + 38 * line},
+                cv::FONT_HERSHEY_SIMPLEX, 0.9, cv::Scalar(30, 30, 30), 2);
+  }
+  const cv::Mat turn = cv::getRotationMatrix2D({600, 400}, turned, 1);
+  cv::warpAffine(sheet, sheet, turn, sheet.size(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  return {as_photo(sheet)};
+}
+
+TEST(FindPicture, AFigureInALayoutIsAPartOfIt) {
+  for (const auto& [text, turned] : {std::pair(true, 0.0), {false, 0.0}, {true, 1.0}}) {
+    const Photo photo = label(text, turned);
+    const FoundPicture found = find_picture(photo, find_corners(photo.image));
+    EXPECT_EQ(found.corners.has_value(), !text || turned != 0) << text << " " << turned;
+  }
+}
+
 TEST(FindPicture, TwoThingsAreWarnedOf) {
   const Corners left = {{{100.3f, 150.6f}, {420.2f, 120.4f}, {430.8f, 460.1f}, {90.7f, 420.9f}}};
   const Corners right = {{{520.3f, 200.6f}, {830.2f, 220.4f}, {800.8f, 560.1f}, {500.7f, 520.9f}}};
