@@ -1,7 +1,6 @@
 #include "bake/bundle/scene/model_pose.hpp"
 
-#include <glm/gtc/quaternion.hpp>
-
+#include "bake/mesh/clip/movement.hpp"
 #include "formats/component.hpp"
 
 namespace modar {
@@ -13,36 +12,22 @@ glm::dmat4 matrix_of(const float (&rows)[12]) {
   return m;
 }
 
-/// What a joint has without tracks.
-JointPlace place_of(const JointRecord& joint) {
-  JointPlace place;
-  for (int i = 0; i < 4; ++i) place.rotation[i] = static_cast<double>(joint.rotation[i]);
-  for (int i = 0; i < 3; ++i) {
-    place.translation[i] = static_cast<double>(joint.translation[i]);
-    place.scale[i] = static_cast<double>(joint.scale[i]);
-  }
-  return place;
-}
-
-void apply(const ClipTracksView& view, float sample, std::vector<JointPlace>& places) {
-  for (const TrackRecord& track : view.tracks) {
-    std::uint32_t key = 0;
-    const TrackValue found = view.at(track, sample, key);
-    const glm::dvec4 value(static_cast<double>(found[0]), static_cast<double>(found[1]),
-                           static_cast<double>(found[2]), static_cast<double>(found[3]));
-    JointPlace& place = places[track.joint];
-    switch (static_cast<TrackPath>(track.path)) {
-      case TrackPath::kTranslation:
-        place.translation = glm::dvec3(value);
-        break;
-      case TrackPath::kRotation:
-        place.rotation = glm::normalize(value);
-        break;
-      case TrackPath::kScale:
-        place.scale = glm::dvec3(value);
-        break;
+/// The joints of a model, as the source had them, but that roots lead to model space.
+std::vector<SourceJoint> joints_of(std::span<const JointRecord> records, std::uint32_t first,
+                                   std::uint32_t model) {
+  std::vector<SourceJoint> joints;
+  for (std::uint32_t j = first; j < records.size() && records[j].model == model; ++j) {
+    const JointRecord& record = records[j];
+    SourceJoint joint{
+        record.parent == kNone ? kNoJoint : record.parent - first, matrix_of(record.before), {}};
+    for (int i = 0; i < 4; ++i) joint.rest.rotation[i] = static_cast<double>(record.rotation[i]);
+    for (int i = 0; i < 3; ++i) {
+      joint.rest.translation[i] = static_cast<double>(record.translation[i]);
+      joint.rest.scale[i] = static_cast<double>(record.scale[i]);
     }
+    joints.push_back(joint);
   }
+  return joints;
 }
 
 template <class T>
@@ -59,20 +44,16 @@ ModelPose::ModelPose(std::span<const JointRecord> joints, std::span<const BoneRe
                      std::span<const std::byte> tracks, double share) {
   std::uint32_t first = 0;
   while (joints[first].model != clip.model) ++first;
-  std::vector<JointPlace> places;
-  for (std::uint32_t j = first; j < joints.size() && joints[j].model == clip.model; ++j) {
-    places.push_back(place_of(joints[j]));
-  }
+  const std::vector<SourceJoint> rest = joints_of(joints, first, clip.model);
   ClipTracksView view;
-  if (view_clip_tracks(tracks, static_cast<std::uint32_t>(places.size()), view) == nullptr) {
-    apply(view, static_cast<float>(share * (view.header->sample_count - 1)), places);
+  std::vector<std::uint32_t> keys;
+  double sample = 0;
+  if (view_clip_tracks(tracks, static_cast<std::uint32_t>(rest.size()), view) == nullptr) {
+    sample = share * (view.header->sample_count - 1);
+  } else {
+    view = {};
   }
-  std::vector<glm::dmat4> matrices;
-  for (std::size_t j = 0; j < places.size(); ++j) {
-    const JointRecord& joint = joints[first + j];
-    const glm::dmat4 own = matrix_of(joint.before) * places[j].matrix();
-    matrices.push_back(joint.parent == kNone ? own : matrices[joint.parent - first] * own);
-  }
+  const std::vector<glm::dmat4> matrices = tracks_pose(rest, view, sample, keys);
   for (const PartRecord& part : parts) {
     if (joints[bones[part.first_bone].joint].model != clip.model) continue;
     for (std::uint32_t b = part.first_bone; b < part.first_bone + part.bone_count; ++b) {

@@ -1,0 +1,105 @@
+"""Clips of glTF files from the command line: which one plays, in a single bake and in a project, and files that contradict themselves."""
+import copy
+import json
+import subprocess
+import sys
+import unittest
+
+from programs import COVER, QUICK, ROOT, ProgramTest
+
+MOVING = ROOT / "tests/import/clips/moving.gltf"
+
+
+class Clips(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self.document = json.loads(MOVING.read_text())
+        self.document["animations"] = [{**self.document["animations"][0], "name": name} for name in ("walk", "wave")]
+        self.write(self.document)
+
+    def write(self, document):
+        (self.folder / "m.gltf").write_text(json.dumps(document))
+
+    def played(self, *words):
+        """The names of clips that scenes play, and whether they loop."""
+        done = self.modar("bake", "m.gltf", COVER, "-o", "m.modar", *QUICK, *words)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(self.modar("check", "m.modar").returncode, 0)
+        return self.scene_clips(self.folder / "m.modar")
+
+    def scene_clips(self, bundle):
+        """By the second reader."""
+        read = json.loads(subprocess.run([sys.executable, ROOT / "scripts/read_bundle.py", "--json", bundle], capture_output=True, text=True, check=True).stdout)
+        return [(read["clips"][each["clip"]]["name"], each["flags"]) for each in read.get("scene_clips", [])]
+
+    def test_the_first_loops_unless_a_scene_says_otherwise(self):
+        for words, wanted in (((), [("walk", 1)]), (("--scene", "cover=m,clip=wave"), [("wave", 1)]),
+                              (("--scene", "cover=m,clip=wave,once"), [("wave", 0)]), (("--scene", "cover=m,clip=none"), [])):
+            with self.subTest(words):
+                self.assertEqual(self.played(*words), wanted)
+        done = self.modar("bake", "m.gltf", COVER, "-o", "n.modar", *QUICK, "--scene", "cover=m,clip=wale")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("'walk'", done.stderr)
+        self.assertFalse((self.folder / "n.modar").exists())
+
+    def test_a_project_says_it_too_and_actions_play_and_stop(self):
+        project = self.folder / "museum"
+        project.mkdir()
+        (project / "m.gltf").write_bytes((self.folder / "m.gltf").read_bytes())
+        (project / "cover.png").write_bytes(COVER.read_bytes())
+        text = ('[bake]\nloop-views = 8\nscore = false\nparameters = "none"\n[[model]]\nfile = "m.gltf"\n[[pattern]]\nfile = "cover.png"\n'
+                '[[scene]]\npattern = "cover"\nmodel = "m"\nname = "pot"\nclip = "wave"\nonce = true\n')
+        for action, code in (('on = "tap pot"\ndo = "play walk on pot"', 0), ('on = "tap pot"\ndo = "stop pot"', 0), ('on = "tap pot"\ndo = "play dance on pot"', 1)):
+            with self.subTest(action):
+                (project / "modar.toml").write_text(text + "[[scene.action]]\n" + action + "\n")
+                done = self.modar("bake", cwd=project)
+                self.assertEqual(done.returncode != 0, code != 0, done.stderr)
+                if code:
+                    self.assertIn("dance", done.stderr)
+                    continue
+                [bundle] = (project / "out").glob("*.modar")
+                self.assertEqual(self.scene_clips(bundle), [("wave", 0)])
+                self.assertEqual(self.modar("check", bundle).returncode, 0)
+
+    def test_files_that_contradict_themselves_are_findings_or_errors(self):
+        def changed(change):
+            document = copy.deepcopy(self.document)
+            change(document, document["animations"][0])
+            return document
+
+        def cycle(document, _):
+            document["nodes"][0]["children"] = [0]
+
+        def crowd(document, _):
+            document["scenes"][0]["nodes"] += range(len(document["nodes"]), len(document["nodes"]) + 10000)
+            document["nodes"] += [{"name": f"n{i}"} for i in range(10000)]
+
+        def camera(document, clip):
+            document["cameras"] = [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}]
+            document["nodes"].append({"camera": 0})
+            document["scenes"][0]["nodes"].append(len(document["nodes"]) - 1)
+            clip["channels"][0]["target"]["node"] = len(document["nodes"]) - 1
+
+        def pointer(document, clip):
+            document["extensionsUsed"] = ["KHR_animation_pointer"]
+            clip["channels"][0]["target"] = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": "/nodes/0/rotation"}}}
+
+        def swapped(document, clip):
+            clip["samplers"][0]["input"], clip["samplers"][0]["output"] = clip["samplers"][0]["output"], clip["samplers"][0]["input"]
+
+        for change, code, told in (
+                (cycle, 3, "gltf.read"), (crowd, 0, ""), (camera, 0, ""), (pointer, 0, "KHR_animation_pointer"), (swapped, 0, "gltf.clip"),
+                (lambda d, clip: clip["channels"][0]["target"].update(node=99), 0, "gltf.clip"),
+                (lambda d, clip: clip["channels"][0].update(sampler=7), 0, "gltf.clip"),
+                (lambda d, clip: d["accessors"][clip["samplers"][0]["input"]].update(count=10**9), 0, "gltf.clip")):
+            with self.subTest(told, change=getattr(change, "__name__", "")):
+                self.write(changed(change))
+                done = self.modar("bake", "--model", "m.gltf", "-o", "m.modar")
+                self.assertEqual(done.returncode, code, done.stderr)
+                self.assertIn(told, done.stderr)
+                if code == 0:
+                    self.assertEqual(self.modar("check", "m.modar").returncode, 0)
+
+
+if __name__ == "__main__":
+    unittest.main()
