@@ -1,5 +1,7 @@
-// `modar document`: manual pages and completions of shells, from the words of --help.
+// `modar document`: manual pages, completions of shells and types for TypeScript, from the words of
+// --help.
 #include <algorithm>
+#include <cctype>
 #include <memory>
 #include <string>
 
@@ -235,6 +237,49 @@ std::string fish_completion(const CommandText& program) {
   return text;
 }
 
+// --- TypeScript ---
+
+/// "--no-lods" as noLods, which bake/extensions/wasm/bake.js turns back.
+std::string camel_case(const std::string& words) {
+  std::string text;
+  for (std::size_t i = words.find_first_not_of('-'); i < words.size(); ++i) {
+    const bool upper = words[i] == '-' && i + 1 < words.size();
+    text +=
+        upper ? static_cast<char>(std::toupper(static_cast<unsigned char>(words[++i]))) : words[i];
+  }
+  return text;
+}
+
+std::string typescript_value(const OptionText& option) {
+  if (option.value.empty()) return "boolean";
+  if (option.choices.empty()) return "Value | Value[]";
+  const std::string one = "'" + joined(option.choices, "' | '") + "'";
+  return one + " | (" + one + ")[]";
+}
+
+/// An interface a command: PatternScoreOptions of `modar pattern score`.
+std::string typescript_options(const CommandText& program) {
+  std::string text =
+      "// Options of the commands of modar. Made by `modar document`.\n"
+      "type Value = string | number;\n";
+  for_commands(program, [&](const CommandText& command) {
+    if (!command.commands.empty()) return;
+    const std::string name = camel_case(replaced(replaced(command.name, "modar", ""), " ", "-"));
+    text += "\n/** " + command.about + " */\nexport interface " +
+            static_cast<char>(std::toupper(static_cast<unsigned char>(name[0]))) + name.substr(1) +
+            "Options {\n";
+    for (const OptionText& option : command.options) {
+      for (const std::string& flag : option.names) {
+        if (!flag.starts_with("--") || flag.starts_with("--help")) continue;
+        text += "  /** " + option.help + (option.value.empty() ? "" : ": " + option.value) +
+                " */\n  " + camel_case(flag) + "?: " + typescript_value(option) + ";\n";
+      }
+    }
+    text += "}\n";
+  });
+  return text;
+}
+
 Result<ExitCode> write_documents(const CommandLine& program, const std::string& folder) {
   const CommandText text = program.describe();
   const std::string pages = folder + "/man/man1";
@@ -248,16 +293,17 @@ Result<ExitCode> write_documents(const CommandLine& program, const std::string& 
   MODAR_TRY(write("bash-completion/completions", "modar", bash_completion(text)));
   MODAR_TRY(write("zsh/site-functions", "_modar", zsh_completion(text)));
   MODAR_TRY(write("fish/vendor_completions.d", "modar.fish", fish_completion(text)));
+  MODAR_TRY(write("modar", "commands.d.ts", typescript_options(text)));
   return ExitCode::kOk;
 }
 
 }  // namespace
 
 void add_document(CommandLine& program) {
-  CommandLine& line = program.command("document", "Write manual pages and shell completion");
+  CommandLine& line = program.command("document", "Write manual pages, shell completion and types");
   const auto folder = std::make_shared<std::string>();
   line.option("-o,--output", folder.get(),
-              "Folder with the layout of /usr/share: man, bash-completion, zsh, fish",
+              "Folder with the layout of /usr/share: man, bash-completion, zsh, fish, modar",
               {.type = "DIR", .required = true});
   line.footer(example("  modar document -o ~/.local/share && man modar-bake\n"));
   line.run([folder, &program] { return write_documents(program, *folder); });

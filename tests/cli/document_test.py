@@ -22,6 +22,14 @@ class Document(ProgramTest):
         self.assertEqual(done.stderr, "")
         return done.stdout.split()
 
+    def test_types_name_every_option_of_a_command(self):
+        text = (self.share / "modar/commands.d.ts").read_text()
+        block = re.search(r"export interface PatternRectifyOptions \{\n(.*?)\n\}", text, re.DOTALL)[1]
+        names = {re.sub("-(.)", lambda letter: letter[1].upper(), name) for name in
+                 re.findall(r"--([a-z-]+)", self.modar("pattern", "rectify", "--help-all").stdout.partition("\nExample:")[0])}
+        self.assertEqual(set(re.findall(r"^  (\w+)\?:", block, re.MULTILINE)), names - {"help"})
+        self.assertIn("  tier?: 'thumb' | 'phone' | 'desktop' | ('thumb' | 'phone' | 'desktop')[];", text)
+
     def test_every_command_has_a_page_with_the_words_of_its_help(self):
         commands = re.findall(r"^  ([a-z]+) ", self.modar("help", "all").stdout, re.MULTILINE)
         self.assertGreater(len(commands), 10)

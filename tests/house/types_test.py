@@ -17,6 +17,19 @@ OPTIONS = {"strict": True, "allowJs": True, "noEmit": True, "target": "es2022", 
            "lib": ["es2022", "dom", "dom.iterable"], "types": []}
 
 
+# The library `modar/bake`, which scripts/wasm/package.sh puts next to the page's modules.
+LIBRARY = ROOT / "bake/extensions/wasm"
+BIN = pathlib.Path(os.environ.get("MODAR_BIN_DIR", ROOT / "build" / "dev" / "bin"))
+USE = """import {bake} from './bake.js';
+const {bundle} = await bake({'vase.glb': new Uint8Array(1)}, {tier: 'phone', noLods: true, pattern: ['a.png', 'b.png']});
+bundle.subarray(1);
+// @ts-expect-error: no such tier
+void bake({}, {tier: 'museum'});
+// @ts-expect-error: no such option
+void bake({}, {noSuchOption: true});
+// @ts-expect-error: the call sets it
+void bake({}, {output: 'a.modar'});
+"""
 WRONG = {"TS2339": "/** @param {number} a */\nexport const f = (a) => a.length;\n", "TS7006": "export const f = (a) => a;\n",
          "TS2531": "export const f = document.body.querySelector('a').href;\n"}
 
@@ -36,7 +49,14 @@ class Types(unittest.TestCase):
             project = pathlib.Path(folder) / "tsconfig.json"
             for code, text in WRONG.items():
                 (pathlib.Path(folder) / f"{code}.js").write_text("// @ts-check\n" + text)
-            files = [ROOT / "tests/house/browser.d.ts", *pathlib.Path(folder).glob("*.js"), *(file for file in modules() if file.name not in GENERATED)]
+            laid = pathlib.Path(folder) / "laid"
+            laid.mkdir()
+            for file in [*(ROOT / "runtime/extensions/web").glob("*.*s"), *LIBRARY.glob("bake*.*s")]:
+                shutil.copy(file, laid)
+            subprocess.run([BIN / "modar", "document", "-o", laid / "documents"], check=True)
+            shutil.copy(laid / "documents/modar/commands.d.ts", laid)
+            (laid / "use.ts").write_text(USE)
+            files = [ROOT / "tests/house/browser.d.ts", laid / "bake.js", laid / "bake-worker.js", laid / "use.ts", *pathlib.Path(folder).glob("*.js"), *(file for file in modules() if file.name not in GENERATED)]
             project.write_text(json.dumps({"compilerOptions": OPTIONS, "files": [str(file) for file in files]}))
             told = subprocess.run([TSC, "-p", project], cwd=ROOT, capture_output=True, text=True).stdout.splitlines()
         planted = [line for line in told if any(f"{code}.js" in line for code in WRONG)]

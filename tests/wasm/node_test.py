@@ -3,6 +3,7 @@
 MODAR_MORE: a folder whose models and pictures are baked as well, each by itself.
 """
 import filecmp
+import hashlib
 import json
 import os
 import pathlib
@@ -10,9 +11,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
+TESTS = pathlib.Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(TESTS / "cli"), str(TESTS / "web")]
+from browser import CHROMIUM, Browser, Server  # noqa: E402
 from programs import BIN, ROOT  # noqa: E402
 
 MODELS = ("*.obj", "*.glb", "*.gltf", "*.ply", "*.stl")
@@ -130,6 +134,50 @@ class Node(unittest.TestCase):
             subprocess.run([*program, "web", "poster.modar", *words], cwd=empty, check=True, capture_output=True)
         differing = subprocess.run(["diff", "-rq", "site", "native-site"], cwd=empty, capture_output=True, text=True)
         self.assertEqual(differing.stdout, "")
+
+
+class Library(unittest.TestCase):
+    """`modar/bake`, from the package's folder."""
+
+    @classmethod
+    def setUpClass(cls):
+        if not (ROOT / "build/web/web/engine-plain.wasm").exists():
+            raise unittest.SkipTest("needs the preset web")
+        cls.base = pathlib.Path(tempfile.mkdtemp(prefix="modar-library-"))
+        cls.addClassCleanup(shutil.rmtree, cls.base, ignore_errors=True)
+        cls.laid = cls.base / "laid"
+        subprocess.run([ROOT / "scripts/wasm/package.sh", cls.laid], check=True)
+
+    def test_node_has_what_the_native_program_has(self):
+        subprocess.run(["node", "--test", TESTS / "wasm/library_test.mjs"], check=True,
+                       env={**os.environ, "MODAR_PACKAGE": str(self.laid), "MODAR_BIN_DIR": str(BIN), "MODAR_SOURCE_DIR": str(ROOT)})
+
+    def test_the_example_bakes_in_a_browser_and_shows_it(self):
+        if CHROMIUM is None:
+            self.skipTest("chromium is not installed")
+        shutil.copy(ROOT / "bake/extensions/wasm/example.html", self.laid)
+        server = Server(self.laid)
+        self.addCleanup(server.close)
+        browser = Browser(self.base / "profile", "/dev/null")
+        self.addCleanup(browser.close)
+        browser.open(f"{server.url}example.html")
+        root = browser.call("DOM.getDocument")["root"]["nodeId"]
+        for name, files in (("picture", ["patterns/cover.png"]), ("model", ["models/pottery.obj", "models/pottery.mtl", "models/pottery.png"])):
+            node = browser.call("DOM.querySelector", nodeId=root, selector=f"input[name={name}]")["nodeId"]
+            browser.call("DOM.setFileInputFiles", files=[str(ASSETS / file) for file in files], nodeId=node)
+        browser.run("document.querySelector('button').click()")
+        browser.wait("document.querySelector('output').value.includes('MB')", "the bake", 600)
+        browser.run("document.querySelector('modar-viewer').look()")
+        browser.wait("document.querySelector('modar-viewer').state === 'around'", "the turntable")
+        if os.environ.get("MODAR_SCREENSHOT"):
+            time.sleep(2)
+            browser.screenshot(os.environ["MODAR_SCREENSHOT"])
+        hexes = browser.run("crypto.subtle.digest('SHA-256', document.querySelector('modar-viewer').srcObject).then((hash) => "
+                            "[...new Uint8Array(hash)].map((byte) => byte.toString(16).padStart(2, '0')).join(''))")
+        subprocess.run([BIN / "modar", "bake", "--quiet", *(ASSETS / file for file in ("patterns/cover.png", "models/pottery.obj")), "-o",
+                        self.base / "native.modar"], check=True)
+        self.assertEqual(hexes, hashlib.sha256((self.base / "native.modar").read_bytes()).hexdigest())
+        self.assertEqual(browser.errors, [])
 
 
 if __name__ == "__main__":
