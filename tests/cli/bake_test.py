@@ -497,7 +497,7 @@ class BadInput(ProgramTest):
         self.assertEqual(self.modar("pattern", "rectify", COVER, "--corners", "0,0,347,0,347,716,0,716", "--width", "43mm", "-o", stated).returncode, 0)
         for file, told in ((stated, True), (f"{stated}:210mm", False), (silent, False)):
             with self.subTest(str(file)):
-                done = self.bake("--pattern", file)
+                done = self.bake("--pattern", file, *QUICK)
                 self.assertEqual("it is printed 43 mm wide" in done.stderr, told, done.stderr)
 
     def test_two_of_one_name(self):
