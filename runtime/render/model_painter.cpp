@@ -24,8 +24,8 @@ float linear(float stored) {
   return stored <= 0.04045f ? stored / 12.92f : std::pow((stored + 0.055f) / 1.055f, 2.4f);
 }
 
-glm::vec4 stored_colour(const float (&rgb)[3], float fourth) {
-  return {rgb[0], rgb[1], rgb[2], fourth};
+glm::vec3 linear(const glm::vec3& stored) {
+  return {linear(stored.x), linear(stored.y), linear(stored.z)};
 }
 
 glm::vec4 linear_colour(const float (&rgb)[3], float factor, float fourth) {
@@ -71,6 +71,23 @@ bool glows(const MaterialRecord& material) {
 
 bool mirrors(const MaterialRecord& material) {
   return (material.flags & (kMaterialReflectance | kMaterialMetalness)) != 0;
+}
+
+/// Share of its brightest channel by which an ambient colour's darkest is less, at least: exporters
+/// write grays that mean nothing.
+constexpr float kColoured = 0.05f;
+
+/// Colour under the light from all around, at most as bright as diffuse: ambient has its part, and
+/// diffuse what it leaves, so that neither 0 nor a weak ambient darkens a surface.
+glm::vec3 ambient_colour(const MaterialRecord& material) {
+  const glm::vec3 diffuse = glm::make_vec3(material.diffuse);
+  const glm::vec3 ambient = glm::make_vec3(material.ambient);
+  const auto [least, most] = std::minmax({ambient.x, ambient.y, ambient.z});
+  if (most - least <= kColoured * most || material_share(material.flags, kMaterialMetalness) > 0.0f)
+    return diffuse;
+  const float bright = std::max({diffuse.x, diffuse.y, diffuse.z});
+  if (bright <= 0.0f) return ambient;
+  return ambient * std::min(1.0f, bright / most) + diffuse * std::max(0.0f, 1.0f - most / bright);
 }
 
 bool equal_layout(const LayoutRecord& a, const LayoutRecord& b) {
@@ -252,13 +269,41 @@ void ModelPainter::set_light(const PaintJob& job, ProgramState& state, const Pie
   if (state.light == whose) return;
   state.light = whose;
   state.material = kNone;  // a highlight has the light's colour
-  const TurnedLight light = own ? lights_.in_model_space(job.items[piece.item], piece.light)
-                                : lights_.in_eye_space(piece.light);
+  TurnedLight& light = state.turned;
+  light = own ? lights_.in_model_space(job.items[piece.item], piece.light)
+              : lights_.in_eye_space(piece.light);
+  state.coloured = false;
   glUniform4fv(state.program.sky, static_cast<GLsizei>(light.sky.size()),
                glm::value_ptr(light.sky[0]));
   job.stats.bytes_uploaded += sizeof light.sky;
   set_vector(state.program.to_key, light.key, job.stats);
   set_vector(state.program.key_colour, light.key_colour, job.stats);
+}
+
+/// Where ambient and diffuse differ, both lights are coloured, and the surface gets the brighter of
+/// both colours: the return value.
+glm::vec3 ModelPainter::set_ambient(const PaintJob& job, ProgramState& state,
+                                    const MaterialRecord& record) {
+  const glm::vec3 diffuse = glm::make_vec3(record.diffuse);
+  const glm::vec3 ambient = ambient_colour(record);
+  const bool coloured = ambient != diffuse;
+  const glm::vec3 both = glm::max(ambient, diffuse);
+  if (!coloured && !state.coloured) return both;
+  state.coloured = coloured;
+  const glm::vec3 under = glm::max(linear(both), 1e-6f);
+  std::array<glm::vec4, 7> sky = state.turned.sky;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const int at = static_cast<int>(c);
+    const float factor = linear(ambient[at]) / under[at];
+    sky[c] *= factor;
+    sky[3 + c] *= factor;
+    sky[6][at] *= factor;
+  }
+  glUniform4fv(state.program.sky, static_cast<GLsizei>(sky.size()), glm::value_ptr(sky[0]));
+  job.stats.bytes_uploaded += sizeof sky;
+  const glm::vec4 key(linear(diffuse) / under, 1.0f);
+  set_vector(state.program.key_colour, state.turned.key_colour * key, job.stats);
+  return both;
 }
 
 void ModelPainter::set_material(const PaintJob& job, ProgramState& state, const Piece& piece) {
@@ -270,7 +315,8 @@ void ModelPainter::set_material(const PaintJob& job, ProgramState& state, const 
   const MaterialRecord& record = bundle_.materials()[material];
   const bool two_sided = (record.flags & kMaterialTwoSided) != 0;
   const ModelProgram& program = state.program;
-  set_vector(program.diffuse, stored_colour(record.diffuse, two_sided ? 1.0f : 0.0f), job.stats);
+  const glm::vec3 colour = set_ambient(job, state, record);
+  set_vector(program.diffuse, glm::vec4(colour, two_sided ? 1.0f : 0.0f), job.stats);
   if (program.key.shiny) {
     const bool shining = shines(record);
     const float metalness = material_share(record.flags, kMaterialMetalness);
@@ -281,8 +327,7 @@ void ModelPainter::set_material(const PaintJob& job, ProgramState& state, const 
     set_vector(program.emission, linear_colour(record.emission, 1.0f, metalness), job.stats);
     const float reflectance = material_share(record.flags, kMaterialReflectance);
     set_vector(program.mirror, mirror_factors(record.shininess, reflectance, metalness), job.stats);
-    glm::vec4 albedo = linear_colour(record.diffuse, 1.0f, 0.0f);
-    albedo.w = metalness > 0.0f ? reflectance * (1.0f - metalness) : 1.0f;
+    glm::vec4 albedo(linear(colour), metalness > 0.0f ? reflectance * (1.0f - metalness) : 1.0f);
     if (program.key.textured) {
       const Rgb8 mean = job.textures.mean(record.texture);
       for (int c = 0; c < 3; ++c)

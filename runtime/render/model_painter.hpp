@@ -71,7 +71,9 @@ class ModelPainter {
     std::uint64_t frame = 0;      ///< projection is of this frame
     std::uint32_t light = kNone;  ///< or the item whose light it is: see set_light()
     std::uint32_t material = kNone;
-    float opacity = 1.0f;  ///< the item's
+    TurnedLight turned;     ///< that light, before the material colours it
+    bool coloured = false;  ///< the uniforms have a material's ambient colour
+    float opacity = 1.0f;   ///< the item's
     std::uint32_t item = kNone;
     std::uint32_t chunk = kNone;  ///< the one whose decoding is set
   };
@@ -120,6 +122,8 @@ class ModelPainter {
   void set_frame(const PaintJob& job, ProgramState& state);
   void set_light(const PaintJob& job, ProgramState& state, const Piece& piece);
   void set_material(const PaintJob& job, ProgramState& state, const Piece& piece);
+  static glm::vec3 set_ambient(const PaintJob& job, ProgramState& state,
+                               const MaterialRecord& record);
   void set_slot(const PaintJob& job, ProgramState& state, const Piece& piece);
   void set_bones(const PaintJob& job, const ProgramState& state, const Piece& piece);
   void set_attributes(std::uint32_t layout, GLuint buffer, std::uintptr_t offset,

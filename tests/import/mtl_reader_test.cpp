@@ -221,6 +221,10 @@ TEST_F(MtlReader, MaterialsAreWhatExportersMean) {
     EXPECT_EQ(m[i].emission, glm::vec3(0.0f)) << m[i].name;
   }
   EXPECT_EQ(m[4].diffuse, glm::vec3(0.2f, 0.6f, 0.2f));
+  for (const auto& each :
+       parse("newmtl zero\nKa 0 0 0\nKd 0.9 0.2 0.1\nnewmtl one\nKd 0.9 0.2 0.1\nKa 1 1 1\n")) {
+    EXPECT_EQ(each.ambient, glm::vec3(0.9f, 0.2f, 0.1f)) << each.name;
+  }
   ASSERT_EQ(findings_.size(), 1u);
   EXPECT_EQ(findings_[0].id, "mtl.opacity-map");
   EXPECT_TRUE(

@@ -322,6 +322,61 @@ TEST_F(GeometryTest, NormalsAreLitAsLambertSays) {
   }
 }
 
+/// Of stored colours lit half from all around and half by the key light, straight on.
+int half_and_half(double ambient, double diffuse) {
+  const auto linear = [](double c) {
+    return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+  };
+  const double light = 0.5 * linear(ambient) + 0.5 * linear(diffuse);
+  const double stored =
+      light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
+  return static_cast<int>(std::lround(255 * stored));
+}
+
+TEST_F(GeometryTest, AmbientLightHasAColourOfItsOwn) {
+  struct Case {
+    std::array<float, 3> ambient, diffuse, shown;  // shown: under the light from all around
+  };
+  // As bright as diffuse at most; 0, 0.2 and 1 mean nothing; what ambient leaves is diffuse's.
+  const std::array<Case, 6> cases = {
+      {{{1, 0.25f, 0}, {0.8f, 0.8f, 0.8f}, {0.8f, 0.2f, 0}},
+       {{0, 0, 0}, {0.8f, 0.4f, 0.1f}, {0.8f, 0.4f, 0.1f}},
+       {{1, 1, 1}, {0.8f, 0.4f, 0.1f}, {0.8f, 0.4f, 0.1f}},
+       {{0.1f, 0, 0}, {0.6f, 0.6f, 0.6f}, {0.6f, 0.5f, 0.5f}},
+       {{0.1f, 0.05f, 0.01f}, {0.8f, 0.4f, 0.08f}, {0.8f, 0.4f, 0.08f}},
+       {{0, 0.6f, 0.3f}, {0, 0, 0}, {0, 0.6f, 0.3f}}}};
+  SceneMaker maker;
+  std::vector<SceneMaker::Chunk> chunks;
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    MaterialRecord material = flat_material();
+    std::copy_n(cases[i].ambient.begin(), 3, material.ambient);
+    std::copy_n(cases[i].diffuse.begin(), 3, material.diffuse);
+    const double x = 0.25 * static_cast<double>(i) - 0.75;
+    Triangle strip;
+    strip.corners = {glm::dvec3(x, -1, 0), {x + 0.25, -1, 0}, {x, 1, 0}};
+    chunks.push_back({{{strip}}, {0.0f}, maker.add_material(material), {}});
+  }
+  maker.add_model(maker.add_layout(Layout::kHalfLit), chunks);
+  const MappedBundle bundle(maker.content);
+  const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
+  ASSERT_TRUE(renderer);
+  RenderOptions options = flat_light();
+  options.light->direction = {0, 0, 1};
+  options.light->key = options.light->sky[0] = glm::vec3(0.5f);
+  renderer->set_options(options);
+  const DrawItem item{0, glm::translate(glm::mat4(1.0f), glm::vec3(0, 0, -4)), kNone,
+                      glm::mat4(1.0f)};
+  const auto pixels = draw(*renderer, camera_above(128), {&item, 1});
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    const std::size_t column = 16 + 16 * i + 4;
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_NEAR(pixels[4 * (96 * 128 + column) + c],
+                  half_and_half(cases[i].shown[c], cases[i].diffuse[c]), 7)
+          << "case " << i << " channel " << c;
+    }
+  }
+}
+
 /// What a lobe of cosines to the power of a quarter of `shininess` about `towards` sees of the room
 /// whose irradiance the coefficients are: a sum over the sphere.
 double seen_along(const RoomLight& light, const glm::dvec3& towards, double shininess, int c) {

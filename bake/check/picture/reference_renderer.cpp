@@ -22,7 +22,6 @@ struct ShadedVertex {
   double inverse_depth = 0;  ///< 0: behind the camera
   glm::dvec3 light{1.0};     ///< linear
   glm::dvec3 added{0.0};     ///< linear
-  glm::dvec3 diffuse{1.0};   ///< as stored
   glm::dvec2 uv{0.0};
   glm::dvec4 colour{1.0};
 };
@@ -89,6 +88,18 @@ Result<std::vector<SoftTexture>> load_textures(const TriMesh& mesh, unsigned job
 }
 
 namespace {
+
+/// Of the light from all around, stored: the coloured Ka of an MTL, at most as bright as Kd, and Kd
+/// in what that leaves.
+glm::dvec3 ambient_colour(const SourceMaterial& m) {
+  const glm::dvec3 ka(m.ambient);
+  const glm::dvec3 kd(m.diffuse);
+  const double most = std::max({ka.r, ka.g, ka.b});
+  const double bright = std::max({kd.r, kd.g, kd.b});
+  if (m.metalness > 0 || std::min({ka.r, ka.g, ka.b}) >= 0.95 * most) return kd;
+  if (bright <= 0 || most <= 0) return most <= 0 ? kd : ka;
+  return most < bright ? ka + kd * (1 - most / bright) : ka * (bright / most);
+}
 
 class Canvas {
  public:
@@ -160,14 +171,15 @@ class Canvas {
     const glm::dvec3 mirrored = sky(glm::reflect(ray, world), factors.x, factors.y);
     const double edge = std::pow(1 - std::min(std::fabs(glm::dot(world, ray)), 1.0), 5.0);
     ShadedVertex lit;
-    lit.light = sky(world, 1, 1) + key * std::max(glm::dot(world, to_key), 0.0);
+    const glm::dvec3 diffuse = srgb_to_linear(glm::dvec3(m.diffuse));
+    lit.light = srgb_to_linear(ambient_colour(m)) * sky(world, 1, 1) +
+                diffuse * key * std::max(glm::dot(world, to_key), 0.0);
     const glm::dvec3 highlight = srgb_to_linear(glm::dvec3(m.specular)) * key * shine;
     const auto metalness = static_cast<double>(m.metalness);
     const double share = metalness > 0 ? static_cast<double>(m.reflectance) * (1 - metalness) : 1.0;
-    lit.light = glm::mix(lit.light, mirrored + highlight, metalness);
+    lit.light = glm::mix(lit.light, diffuse * (mirrored + highlight), metalness);
     lit.added = srgb_to_linear(glm::dvec3(m.emission)) + share * highlight +
                 mirrored * (factors.z + factors.w * edge);
-    lit.diffuse = glm::dvec3(m.diffuse);
     if (!mesh_.uvs.empty()) lit.uv = mesh_.uvs[v];
     if (!mesh_.colours.empty()) lit.colour = glm::dvec4(mesh_.colours[v]) / 255.0;
     if (eye.z >= 0) return lit;
@@ -229,7 +241,7 @@ class Canvas {
       base *= glm::dvec4(glm::dvec3(texel), 1.0);
     }
     depth_[at] = near;
-    const glm::dvec3 albedo = srgb_to_linear(v[0].diffuse) * srgb_to_linear(glm::dvec3(base));
+    const glm::dvec3 albedo = srgb_to_linear(glm::dvec3(base));
     const auto seen_at = [&](const ShadedVertex& lit) {
       return linear_to_srgb(albedo * lit.light + lit.added);
     };

@@ -323,6 +323,12 @@ void parse_opacity(float opacity, MtlContext& context, SourceMaterial& material)
   material.opacity = std::min(opacity, 1.0f);
 }
 
+/// Whether Ka says nothing: exporters write 0, 0.2 or 1 of their own accord. As in the renderer.
+bool is_gray(const glm::vec3& ka) {
+  const auto [least, most] = std::minmax({ka.r, ka.g, ka.b});
+  return most - least <= 0.05f * most;
+}
+
 /// What a material's statements say together. Pr and Pm are the roughness and metalness that
 /// Blender and others write; without them, what has a highlight reflects as all dielectrics do, or
 /// as much as Ks says where the illumination model has reflection (illum 3 and 5).
@@ -362,6 +368,7 @@ struct MtlStatements {
       m.whitened = has_kd && kd != glm::vec3(1.0f);
       m.diffuse = glm::vec3(1.0f);
     }
+    if (is_gray(m.ambient)) m.ambient = m.diffuse;
     if (m.diffuse_map == emission_map && !emission_map.empty()) m.emission = glm::vec3(0.0f);
     const auto light = [](const glm::vec3& stored) {
       glm::dvec3 linear(0.0);
