@@ -36,7 +36,15 @@ TEST(RenderBench, TellsWhatEachWayCosts) {
   if (!rows && rows.error().code == "gl.context") GTEST_SKIP() << to_line(rows.error());
   ASSERT_TRUE(rows) << to_line(rows.error());
 
-  EXPECT_EQ(value(*rows, "model x3 index_vbo draw_calls", false), 3);
+  for (const char* way : {"index_arrays", "index_vbo", "instancing_arrays", "instancing_vbo"}) {
+    const std::string head = std::string("model x3 ") + way;
+    const bool one = head.find("instancing") != std::string::npos;
+    EXPECT_EQ(value(*rows, head + " draw_calls", false), one ? 1 : 3);
+    EXPECT_EQ(value(*rows, head + " state_changes", false), 0) << "the same copies again";
+    const bool streams = head.find("arrays") != std::string::npos;
+    EXPECT_EQ(value(*rows, head + " bytes_per_frame", false) > 3.0 * kTriangles * 3 * (12 + 2),
+              streams);
+  }
   EXPECT_EQ(value(*rows, "model x3 instancing_vbo draw_calls", false), 1);
   EXPECT_EQ(value(*rows, "model x3 instancing_vbo draw_calls", true), 3);
   // On paper: three copies of vertices of 12 bytes and indices of 2, three a triangle.

@@ -545,7 +545,7 @@ Result<void> add_bundle(const std::string& path, std::span<const CurvePoint> idl
   for (const std::uint32_t model : curve_models(stage.bundle, options)) {
     Curves curves{name(model), std::span(drawn).subspan(first, kWays * copies), {}, copies};
     if (idle.size() == drawn.size()) curves.idle = idle.subspan(first, kWays * copies);
-    for (std::size_t way = kIndexVbo; way < kWays; ++way) add_curve(curves, way, rows);
+    for (std::size_t way = kIndexArrays; way < kWays; ++way) add_curve(curves, way, rows);
     add_paper_gains(curves, rows);
     first += kWays * copies;
     MODAR_TRY(add_shading_cost(stage, model, curves.name, options, rows));

@@ -48,14 +48,14 @@ struct RenderBenchRow {
   double reference = 0;
 };
 
-/// Ways: index_vbo, instancing_arrays, instancing_vbo (uniform matrix array), instanced_arrays (the
-/// extension, where the context has it); the reference is index_arrays: a call a copy, from client
-/// memory. Figures: draw_calls, state_changes, bytes_per_frame (what the driver is handed),
-/// frame_ms (wall clock until the driver has finished), cpu_ms (of the process while the driver
-/// rasterises nothing: Mesa's no-op driver, in a child process; left out where Mesa is not the
-/// driver). "MODEL x10 WAY gain_low_end" and "gain_mid_range": how often our frame time of
-/// index_arrays holds that of the way, and the paper's; Tables 10 to 12 in their own units, with
-/// seconds of 1,800 frames: "table11_fps_low_end", "table10_speed_up_pct_low_end". "MODEL x1
+/// Ways: index_arrays, index_vbo, instancing_arrays, instancing_vbo (uniform matrix array),
+/// instanced_arrays (the extension, where the context has it); the reference is index_arrays: a
+/// call a copy, from client memory. Figures: draw_calls, state_changes, bytes_per_frame (what the
+/// driver is handed), frame_ms (wall clock until the driver has finished), cpu_ms (of the process
+/// while the driver rasterises nothing: Mesa's no-op driver, in a child process; left out where
+/// Mesa is not the driver). "MODEL x10 WAY gain_low_end" and "gain_mid_range": how often our frame
+/// time of index_arrays holds that of the way, and the paper's; Tables 10 to 12 in their own units,
+/// with seconds of 1,800 frames: "table11_fps_low_end", "table10_speed_up_pct_low_end". "MODEL x1
 /// shading_cpu_ms" (CPU time of a frame with a camera picture, the model on its pattern, its
 /// shadow): the reference is plain shading. Then, a bundle (by its path): open_ms; load_cpu_ms
 /// (buffers into GL) and driver_cpu_ms (glBufferData of the same bytes alone), both against memcpy;
