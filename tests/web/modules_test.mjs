@@ -10,6 +10,7 @@ import { Engine, engineFailed, shrinkOf } from '../../runtime/extensions/web/eng
 import { Gyroscope, toCamera } from '../../runtime/extensions/web/gyroscope.js';
 import { isNewer } from '../../runtime/extensions/web/installed-release.js';
 import { drawFrame, projectionOf } from '../../runtime/extensions/web/modar.js';
+import { susScore, VisitLog } from '../../runtime/extensions/web/survey.js';
 import { groundTransform, viewFrom } from '../../runtime/extensions/web/turntable.js';
 import { directionOf, fill, labelOf } from '../../runtime/extensions/web/viewer-words.js';
 
@@ -221,4 +222,26 @@ test('a turn between two frames is the mean of the readings', async () => {
   assert.equal(gyroscope.turn(1020, 1040), undefined);
   near(gyroscope.turn(1040, 1140), [0.1 * 15 * degree, 0, 0]);
   assert.equal(Gyroscope.of({ srcObject: null }), null);
+});
+
+test('answers to the System Usability Scale', () => {
+  // Brooke's own example of 1996.
+  assert.equal(susScore([5, 4, 2, 1, 2, 3, 2, 4, 5, 2]), 55);
+  assert.equal(susScore([5, 1, 5, 1, 5, 1, 5, 1, 5, 1]), 100);
+  assert.equal(susScore([3, 3, 3, 3, 3, 3, 3, 3, 3, null]), null);
+});
+
+test('a visit is logged with the members of modar-play\'s log', () => {
+  const log = new VisitLog({ page: 'P' });
+  for (let i = 0; i <= 10; ++i) {
+    if (i === 4) log.event('found', { name: 'cover', time: 20.4 });
+    if (i === 8) log.event('lost', { name: 'cover', time: 20.8, reason: 'out of view' });
+    log.frame({ reason: i >= 4 && i < 8 ? 'visible' : 'few matches', time: 20 + i / 10, copyMs: 1, stepMs: i === 4 ? 40 : i });
+  }
+  const lines = log.text({ sus: [], score: null }).trim().split('\n').map((line) => JSON.parse(line));
+  assert.deepEqual(lines[0], { qos: { version: 1, page: 'P', budget_ms: 33.333 } });
+  assert.deepEqual(lines[1], { event: 'found', pattern: 'cover', time_s: 20.4, after_s: 0.4 });
+  assert.deepEqual(lines[2], { event: 'lost', pattern: 'cover', time_s: 20.8, after_s: 0.4, reason: 'out of view' });
+  assert.deepEqual(lines[3], { second: { from_s: 20, frames: 11, visible: 4, late: 1, reasons: { 'few matches': 7, visible: 4 }, ms: { track: { median: 7, p95: 41, max: 41 } } } });
+  assert.deepEqual(lines[4], { survey: { sus: [], score: null } });
 });

@@ -888,6 +888,42 @@ class Page(ProgramTest):
         links = self.browser.run("[...document.querySelectorAll('#links a')].map(({ href, textContent }) => [textContent, href])")
         self.assertEqual(links, [["Accessibility statement", self.server.url + "accessibility-en.html"], ["Imprint", "https://example.org/imprint"], ["Write to us", "mailto:us@example.org"]])
 
+    def test_a_visitors_answers_are_kept_and_saved_with_the_log(self):
+        self.browser.open(self.server.url + "?survey&lang=de")
+        self.browser.wait("document.getElementById('survey-open')?.textContent === 'Fragen zu Ihrem Besuch'", "the questions' button")
+        self.browser.run("document.getElementById('start').click()")
+        self.browser.wait("document.getElementById('viewer').state === 'seen'", "the picture")
+        self.browser.run("document.getElementById('viewer').stop()")
+        self.browser.run("document.getElementById('survey-open').click()")
+        self.browser.run("""(() => {
+  for (let i = 0; i < 10; ++i) document.querySelector(`[name=s${i}][value="${i % 2 ? 2 : 4}"]`).click();
+  document.getElementById('answer-4').value = 'Mehr Töpfe';
+  document.getElementById('answer-4').dispatchEvent(new Event('change', { bubbles: true }));
+})()""")
+        self.keep("survey.png")
+        self.browser.open(self.server.url + "?survey&lang=en")  # on a later visit, the answers are there
+        self.browser.wait("document.getElementById('survey-open')?.textContent === 'Questions about your visit'", "English")
+        lines = self.browser.run("""(() => {
+  document.getElementById('survey-open').click();
+  const saved = new Promise((resolve) => {
+    const make = URL.createObjectURL;
+    URL.createObjectURL = (blob) => {
+      URL.createObjectURL = make;
+      blob.text().then(resolve);
+      return make.call(URL, blob);
+    };
+  });
+  document.querySelector('#survey button').click();
+  return saved;
+})()""")
+        head, survey = [json.loads(line) for line in lines.splitlines()]
+        self.assertEqual((head["qos"]["page"], head["qos"]["version"]), ("Pots & pans", 1))
+        self.assertEqual(survey["survey"], {"language": "de", "sus": [4, 2] * 5, "score": 75, "answers": ["", "", "", "", "Mehr Töpfe"]})
+        self.assertEqual(self.browser.run("document.getElementById('answer-4').value"), "Mehr Töpfe")
+        self.browser.open(self.server.url)
+        self.browser.wait("document.getElementById('start').textContent !== ''", "the plain page")
+        self.assertFalse(self.browser.run("Boolean(document.getElementById('survey-open'))"))
+
     def test_a_film_shows_the_model(self):
         self.browser.resize(390, 844, 1, True)
         self.browser.open(self.server.url)

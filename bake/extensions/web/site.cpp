@@ -30,7 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Files copied unchanged; index.html, sw.js and the words are written with changes.
-constexpr std::array<std::string_view, 27> kPageFiles = {"app.js",
+constexpr std::array<std::string_view, 28> kPageFiles = {"app.js",
                                                          "download.js",
                                                          "engine-plain.js",
                                                          "engine-plain.wasm",
@@ -55,6 +55,7 @@ constexpr std::array<std::string_view, 27> kPageFiles = {"app.js",
                                                          "record-worker.js",
                                                          "room.svg",
                                                          "style.css",
+                                                         "survey.js",
                                                          "viewer-words.js",
                                                          "lod-stream.js"};
 /// Modules that app.js contains, for other pages next to this one.
@@ -371,6 +372,11 @@ Result<void> put_page(Draft& draft) {
     MODAR_ASSIGN(const std::string words, words_of(draft, language));
     MODAR_TRY(put(draft, "words/" + language + ".json", words));
     draft.site.page_bytes += words.size();
+    const std::string questions = "survey/" + language + ".json";
+    const bool own = fs::exists(draft.page + "/" + questions);
+    MODAR_ASSIGN(const std::string survey, page_text(draft, own ? questions : "survey/en.json"));
+    MODAR_TRY(put(draft, questions, survey));
+    draft.site.page_bytes += survey.size();
   }
   return {};
 }

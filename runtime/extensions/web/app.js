@@ -54,6 +54,11 @@ const OWN_CACHE = `modar own ${SCOPE}`;
  * @type {Promise<import('./own-picture.js').OwnPictures> | null}
  */
 let own = null;
+/**
+ * Where the page's address asks for it.
+ * @type {import('./survey.js').Survey | null}
+ */
+let survey = null;
 
 /** @type {Site} */
 let site;
@@ -108,6 +113,7 @@ async function useLanguage(language) {
   });
   showPlates();
   showLinks();
+  await survey?.speak(language, words.back);
 }
 
 function showLanguages() {
@@ -254,6 +260,11 @@ async function prepare() {
   await chooseBundles();
   if (!navigator.connection?.saveData)
     loading = loadBundle().catch(() => {});  // the start button names the fault
+  if (new URLSearchParams(location.search).has('survey')) {
+    const {Survey} = await import('./survey.js');
+    survey = new Survey(
+        {viewer, foot: $('foot'), title: site.title, adopt, fetchJson, store, stored});
+  }
   await useLanguage(chooseLanguage(site.languages));
   showLanguages();
   update();
