@@ -107,6 +107,8 @@ struct DefectCount {
 struct MeshDefects {
   std::string model;  ///< its name
   std::array<DefectCount, kDefects> counts{};
+  /// Whether backs of a material's triangles would be seen: its surface is open, or inside out.
+  std::vector<bool> backs;
   [[nodiscard]] DefectCount& of(Defect defect) { return counts[static_cast<std::size_t>(defect)]; }
 };
 

@@ -249,8 +249,56 @@ Result<SourceModel> read_moving(const ModelRequest& model, const BakeRequest& re
   return source;
 }
 
-Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& request,
-                                  TextureUses& textures, Report& report, BakeTrace& trace) {
+/// Out of the pattern in a model's coordinates; zero where its scenes differ.
+glm::dvec3 viewer_of(std::size_t model, UpAxis up, const std::vector<KnownScene>& scenes) {
+  const auto out = [](UpAxis axis, const std::array<double, 3>& turn) {
+    return glm::inverse(rotation_of(axis, turn)) * glm::dvec3(0, 0, 1);
+  };
+  std::optional<glm::dvec3> all;
+  for (const KnownScene& known : scenes) {
+    if (known.model != model) continue;
+    const glm::dvec3 own = out(known.scene.up.value_or(up), known.scene.turn);
+    if (all && glm::dot(*all, own) < 0.999) return glm::dvec3(0.0);
+    all = own;
+  }
+  return all.value_or(out(up, {}));
+}
+
+/// Sides of its pattern from which on a model's offset is taken for a slip.
+constexpr double kFarSides = 10;
+
+void tell_far(const SceneRequest& resolved, Report& report) {
+  const auto& offset = resolved.offset.value;
+  const double sides = std::hypot(offset[0], offset[1], offset[2]);
+  if (sides < kFarSides) return;
+  report.diagnostics.push_back(
+      {"scene.far", DiagnosticSeverity::kWarning, resolved.pattern + "=" + resolved.model, 0,
+       "its offset is " + std::to_string(std::lround(sides)) +
+           " times the pattern's longer side, where few cameras see it with the pattern",
+       "check the unit: offset= is in mm where the pattern's width is known, else in its sides"});
+}
+
+/// Draws materials whose backs would be seen from both sides, where the format does not say.
+void draw_backs(TriMesh& mesh, const std::vector<bool>& backs, Report& report) {
+  std::size_t count = 0;
+  for (std::size_t m = 0; m < backs.size(); ++m) {
+    SourceMaterial& material = mesh.materials[m];
+    if (!backs[m] || material.sides_stated || material.occluder()) continue;
+    material.two_sided = true;
+    ++count;
+  }
+  if (count == 0) return;
+  report.diagnostics.push_back(
+      {"model.two-sided", DiagnosticSeverity::kInfo, mesh.name, 0,
+       std::to_string(count) + " of " + std::to_string(mesh.materials.size()) +
+           " materials are on open or inside-out surfaces: both sides of them are drawn",
+       ""});
+}
+
+Result<WeldedModel> read_and_weld(std::size_t number, const BakeRequest& request,
+                                  const std::vector<KnownScene>& scenes, TextureUses& textures,
+                                  Report& report, BakeTrace& trace) {
+  const ModelRequest& model = request.models[number];
   StageTimer reading(report, "read");
   ModelMovement movement;
   Result<SourceModel> source = read_moving(model, request, movement);
@@ -267,8 +315,10 @@ Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& 
     mesh.error().where = model.path;  // it has the model's name only
     return tl::unexpected(mesh.error());
   }
-  report.defects.push_back(count_defects(*mesh, request.repairs(), report));
   report.uprights.push_back(request.up ? Upright{*request.up, UpReason::kAsked} : find_up(*mesh));
+  const glm::dvec3 viewer = viewer_of(number, report.uprights.back().axis, scenes);
+  report.defects.push_back(count_defects(*mesh, request.repairs(), viewer, report));
+  draw_backs(*mesh, report.defects.back().backs, report);
   if (request.topology) {
     TopologyOptions options;
     options.jobs = request.jobs;
@@ -448,8 +498,8 @@ Result<void> add_models(const BakeRequest& request, const std::vector<KnownScene
                         BundleContent& content, Report& report, BakeTrace& trace) {
   TextureUses textures;
   std::vector<WeldedModel> models;
-  for (const ModelRequest& model : request.models) {
-    Result<WeldedModel> welded = read_and_weld(model, request, textures, report, trace);
+  for (std::size_t m = 0; m < request.models.size(); ++m) {
+    Result<WeldedModel> welded = read_and_weld(m, request, scenes, textures, report, trace);
     if (!welded) return tl::unexpected(welded.error());
     for (const KnownScene& known : scenes) {
       if (known.model != models.size()) continue;
@@ -617,6 +667,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, B
                                report.uprights[first_up + known.model].axis};
     MODAR_ASSIGN(SceneRequest resolved, resolve_scene(known.scene, content, known.pattern, model));
     content.scenes.push_back(place_scene(resolved, content, known.pattern, model));
+    tell_far(resolved, report);
     named.scenes.push_back(std::move(resolved));
   }
   MODAR_TRY(add_scene_clips(named.scenes, content));

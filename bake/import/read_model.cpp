@@ -104,6 +104,7 @@ Result<SourceModel> read_model(const std::string& path, const ReadOptions& optio
   MODAR_ASSIGN(SourceModel model, read_format(path, options));
   if (format_of(extension_of(path)) != Format::kGltf) account_for(model);
   for (SourceMaterial& m : model.materials) {
+    m.sides_stated = format_of(extension_of(path)) == Format::kGltf;
     // Clay is for what has no colour: those of vertices are seen unchanged.
     const bool clay = m.diffuse_map.empty() && m.diffuse == glm::vec3(kClay);
     if (clay && !model.colours.empty()) m.diffuse = glm::vec3(1.0f);

@@ -59,7 +59,8 @@ struct SourceMaterial {
   MapPlace place;  ///< of the diffuse map; readers apply it to the uvs
   NormalMap normal;
   bool two_sided = false;
-  bool whitened = false;  ///< its file states a gray for its picture, which is shown unchanged
+  bool sides_stated = false;  ///< its format says whether it is two-sided
+  bool whitened = false;      ///< its file states a gray for its picture, which is shown unchanged
   std::uint32_t part = 0xFFFFFFFFu;  ///< of SourceMovement, whose faces it has; else nothing moves
   bool see_through = false;  ///< its picture has alpha; unknown (false) until it has been read
   /// Named "occluder": represents a real object, hides content behind it and is invisible itself.

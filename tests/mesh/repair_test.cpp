@@ -124,14 +124,17 @@ struct Repaired {
   std::uint64_t repaired(Defect defect) { return done.of(defect).count; }
 };
 
+constexpr glm::dvec3 kAbove(0, 0, 1);
+
 Repaired repair(const Shape& shape, bool support = false) {
   Repaired result;
   Report report;
-  result.before = count_defects(testing::welded(testing::parse(shape.obj())), false, report);
+  result.before =
+      count_defects(testing::welded(testing::parse(shape.obj())), false, kAbove, report);
   SourceModel model = testing::parse(shape.obj());
   result.done = repair_model(model, support, report);
   result.mesh = testing::welded(model);
-  result.left = count_defects(result.mesh, true, report);
+  result.left = count_defects(result.mesh, true, kAbove, report);
   result.said = report.diagnostics;
   return result;
 }
@@ -344,6 +347,65 @@ TEST(Repair, JoinsSeamsThatWereWrittenTwice) {
   Repaired result = repair(shape);
   for (const DefectCount& found : result.before.counts) EXPECT_EQ(found.count, 0u);
   EXPECT_EQ(CountedDefects(faces_of(result.mesh)).open, 0u);
+}
+
+/// The lower half of a sphere of radius 10, open above; its normals point outwards.
+Shape bowl(double depth = 1) {
+  Shape shape;
+  constexpr int kRings = 8, kSides = 24;
+  for (int r = 0; r <= kRings; ++r) {
+    const double down = 1.5707963 * r / kRings;
+    for (int s = 0; s < kSides; ++s) {
+      const double turn = 6.2831853 * s / kSides;
+      shape.at(10 * std::cos(down) * std::cos(turn), 10 * std::cos(down) * std::sin(turn),
+               -10 * depth * std::sin(down));
+      if (r == kRings) continue;
+      const int a = r * kSides + s, b = r * kSides + (s + 1) % kSides;
+      shape.faces.push_back({a, a + kSides, b});
+      shape.faces.push_back({b, a + kSides, b + kSides});
+    }
+  }
+  return shape;
+}
+
+Shape turned(Shape shape) {
+  for (auto& face : shape.faces) std::swap(face[1], face[2]);
+  return shape;
+}
+
+TEST(Sides, BacksOfOpenAndInsideOutSurfacesAreSeen) {
+  const auto backs = [](const Shape& shape, glm::dvec3 viewer = kAbove) {
+    Report report;
+    const TriMesh mesh = testing::welded(testing::parse(shape.obj()));
+    const std::vector<bool> seen = count_defects(mesh, false, viewer, report).backs;
+    return seen.size() == 1 && seen[0];
+  };
+  EXPECT_TRUE(backs(bowl())) << "people look into it";
+  EXPECT_TRUE(backs(turned(bowl()))) << "its walls are seen from beside it";
+  EXPECT_FALSE(backs(turned(bowl(0.1)))) << "a valley";
+  EXPECT_FALSE(backs(turned(bowl(-1)))) << "a dome on the ground";
+  EXPECT_TRUE(backs(turned(bowl(-1)), {0, 0, -1})) << "a dome from below";
+  EXPECT_TRUE(backs(bowl(-1))) << "a dome inside out";
+  EXPECT_TRUE(backs(turned(bowl()), {1, 0, 0})) << "it is tipped over";
+  EXPECT_TRUE(backs(turned(bowl()), {0, 0, 0})) << "scenes show it differently";
+  EXPECT_FALSE(backs(pillow(20)));
+  EXPECT_TRUE(backs(turned(pillow(20))));
+  Shape soup = pillow(20);
+  for (std::size_t f = 0; f < soup.faces.size(); f += 3)
+    std::swap(soup.faces[f][1], soup.faces[f][2]);
+  EXPECT_TRUE(backs(soup)) << "of no winding";
+  Shape hole = pillow(40);
+  hole.faces.erase(hole.faces.begin() + 1000, hole.faces.begin() + 1002);
+  std::swap(hole.faces[7][1], hole.faces[7][2]);
+  EXPECT_FALSE(backs(hole)) << "a scan with a hole and a turned triangle";
+  Shape hollow = pillow(20);
+  const Shape inner = turned(pillow(20));
+  for (const auto& p : inner.positions) hollow.at(0.5 * p[0] + 5, 0.5 * p[1] + 5, 0.5 * p[2]);
+  for (const auto& f : inner.faces) {
+    const int first = static_cast<int>(inner.positions.size());
+    hollow.faces.push_back({f[0] + first, f[1] + first, f[2] + first});
+  }
+  EXPECT_FALSE(backs(hollow)) << "a print with a cavity";
 }
 
 TEST(Repair, MakesAStripOfOneSideTwoSided) {

@@ -105,7 +105,7 @@ int probe_repair(const std::string& path, unsigned repair, const std::string& ou
   if (!mesh) return complain(mesh.error());
   {
     const Stopwatch watch;
-    const MeshDefects left = count_defects(*mesh, repair != 0, report);
+    const MeshDefects left = count_defects(*mesh, repair != 0, {}, report);
     for (std::size_t i = 0; i < kDefects; ++i) {
       print(kDefectNames[i], static_cast<double>(left.counts[i].count));
       print("  area", left.counts[i].area);

@@ -53,7 +53,7 @@ class Counter {
           MeshDefects& defects)
       : surface_(surface), around_(around), clean_(clean), defects_(defects) {}
 
-  void run() {
+  void run(std::span<const std::uint32_t> materials, const glm::dvec3& viewer) {
     for_each_edge(
         surface_, around_, [&](std::uint32_t v) { return clean_[v] == 0; },
         [&](std::span<const std::uint32_t> edge) { count_edge(edge); });
@@ -66,11 +66,13 @@ class Counter {
     for (std::size_t p = 0; p < islands.size(); ++p) {
       if (islands[p]) ++defects_.of(Defect::kIsland).count;
     }
-    for (const auto& [position, loop] : loops()) {
+    const std::map<std::uint32_t, Loop> loops = open_loops(surface_, open_);
+    for (const auto& [position, loop] : loops) {
       const std::uint32_t part = components.of(position);
-      if (islands[part] || !small_hole(loop, components.at(part).box)) continue;
+      if (islands[part] || !small_hole(loop.box, components.at(part).box)) continue;
       ++defects_.of(Defect::kHole).count;
     }
+    defects_.backs = seen_backs(surface_, components, loops, turned_, materials, viewer);
   }
 
  private:
@@ -81,6 +83,7 @@ class Counter {
       ++defects_.of(Defect::kEdge).count;
     } else if (surface_.corners[edge[0]] == surface_.corners[edge[1]]) {
       ++defects_.of(Defect::kWinding).count;
+      turned_.push_back(edge[0]);
     }
   }
 
@@ -111,24 +114,12 @@ class Counter {
                   [&](std::uint32_t) { ++defects_.of(Defect::kDuplicate).count; });
   }
 
-  /// Boxes of open edges that touch, by their lowest positions.
-  [[nodiscard]] std::map<std::uint32_t, PointBox> loops() const {
-    Sets sets(surface_.positions.size());
-    for (const std::uint32_t h : open_) sets.join(surface_.corners[h], surface_.corners[next(h)]);
-    std::map<std::uint32_t, PointBox> loops;
-    for (const std::uint32_t h : open_) {
-      PointBox& box = loops[sets.root(surface_.corners[h])];
-      box.add(surface_.at(h));
-      box.add(surface_.at(next(h)));
-    }
-    return loops;
-  }
-
   const Faces& surface_;
   const Around& around_;
   const Array<std::uint8_t>& clean_;
   MeshDefects& defects_;
-  std::vector<std::uint32_t> open_;  // half-edges
+  std::vector<std::uint32_t> open_;    // half-edges
+  std::vector<std::uint32_t> turned_;  // of changes of winding
   std::vector<std::array<std::uint32_t, 2>> spokes_;
 };
 
@@ -148,7 +139,8 @@ void report_defects(const MeshDefects& defects, bool repaired, Report& report) {
 
 }  // namespace
 
-MeshDefects count_defects(const TriMesh& mesh, bool repaired, Report& report) {
+MeshDefects count_defects(const TriMesh& mesh, bool repaired, const glm::dvec3& viewer,
+                          Report& report) {
   StageTimer timer(report, "defects");
   MeshDefects defects;
   defects.model = mesh.name;
@@ -161,7 +153,8 @@ MeshDefects count_defects(const TriMesh& mesh, bool repaired, Report& report) {
     around = std::make_unique<Around>(counted.surface());
     clean = clean_positions(counted.surface(), *around);
   }
-  Counter(counted.surface(), *around, clean, defects).run();
+  Counter(counted.surface(), *around, clean, defects)
+      .run({mesh.triangle_material.data(), mesh.triangle_material.size()}, viewer);
   report_defects(defects, repaired, report);
   timer.done(mesh.triangles.size(), 0);
   return defects;

@@ -15,8 +15,9 @@ namespace modar {
 /// on, too, and warns if no such surface is found.
 MeshDefects repair_model(SourceModel& model, bool support, Report& report);
 
-/// How much of that a mesh has. repaired: positions that were split are not one again. Takes a
-/// hundredth of a bake.
-MeshDefects count_defects(const TriMesh& mesh, bool repaired, Report& report);
+/// How much of that a mesh has. repaired: positions that were split are not one again. viewer: out
+/// of the pattern, in the mesh's coordinates; zero: unknown. Takes a hundredth of a bake.
+MeshDefects count_defects(const TriMesh& mesh, bool repaired, const glm::dvec3& viewer,
+                          Report& report);
 
 }  // namespace modar

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -192,6 +193,7 @@ class Components {
   Components(const Faces& surface, std::span<const std::uint32_t> open);
   [[nodiscard]] std::uint32_t of(std::uint32_t position) const { return part_[position]; }
   [[nodiscard]] const Part& at(std::size_t number) const { return parts_[number]; }
+  [[nodiscard]] std::size_t count() const { return parts_.size(); }
   /// Whether each part is debris: small, and open or of few triangles. None where the model has no
   /// main part, or where they are too much of the area, see `many`.
   [[nodiscard]] std::vector<bool> islands(bool& many);
@@ -204,7 +206,22 @@ class Components {
   std::vector<Part> parts_;    // that have triangles, in the order of these
 };
 
+/// Open edges that touch.
+struct Loop {
+  PointBox box;
+  glm::dvec3 area{0.0};  ///< of the surface that it bounds, as a vector
+};
+/// By their lowest positions. open: half-edges.
+std::map<std::uint32_t, Loop> open_loops(const Faces& surface, std::span<const std::uint32_t> open);
+
 /// Whether an open loop is a hole of a part, and not its rim.
 bool small_hole(const PointBox& loop, const PointBox& part);
+
+/// See MeshDefects::backs. turned: a half-edge of each change of winding. materials: of triangles.
+/// viewer: as for count_defects().
+std::vector<bool> seen_backs(const Faces& surface, const Components& components,
+                             const std::map<std::uint32_t, Loop>& loops,
+                             std::span<const std::uint32_t> turned,
+                             std::span<const std::uint32_t> materials, const glm::dvec3& viewer);
 
 }  // namespace modar::repair
