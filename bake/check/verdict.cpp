@@ -2,8 +2,11 @@
 #include "bake/check/verdict.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <iterator>
+
+#include <glm/gtc/quaternion.hpp>
 
 #include "bake/check/device/device_rules.hpp"
 #include "bake/check/yml_rule.hpp"
@@ -66,7 +69,7 @@ constexpr IssueKind kKinds[] = {
      "bake it again from this source"},
     {"POSE_RANGE", Severity::kError,
      "A pattern is missed in easy views (a warning where only tilted ones are missed)",
-     "use a picture with more texture, evenly spread, or a larger print"},
+     "`modar pattern score` names the cause; or use a larger print"},
     {"VISUAL_DIFFERS", Severity::kError, "A model does not look like its source",
      "look at the picture of the worst view; bake with larger textures or a smaller --max-error"},
     {"BUNDLE_PREVIEW", Severity::kWarning,
@@ -92,6 +95,14 @@ constexpr IssueKind kKinds[] = {
      "A scene's shadow does not follow from its model and its place", kRebake},
     {"SOURCE_READER", Severity::kWarning, "One reader alone has read a model or its colours",
      "look at it in another viewer; the second reader is in the package of `modar-lab`"},
+    {"PATTERN_UNSEEN", Severity::kWarning,
+     "A pattern was recognised in no view of its score: nothing on it will be seen",
+     "`modar pattern score` names the cause; choose another picture"},
+    {"MODEL_UNSEEN", Severity::kWarning,
+     "Nothing of a model is drawn for those who look at its pattern: it shows them backs of "
+     "one-sided "
+     "materials, or is transparent",
+     "turn it (turn=180:0:0), or make its materials two-sided or opaque"},
 };
 static_assert(std::size(kKinds) == static_cast<std::size_t>(WorkstationRule::kCount));
 
@@ -182,6 +193,45 @@ void report_preview(const BundleView& bundle, const IssueSink& sink) {
         std::nullopt});
 }
 
+/// Cosine of the angle from which on a normal is turned away from those who look at a pattern.
+constexpr float kTurnedAway = -0.87f;
+
+/// Opacity below which nothing shows.
+constexpr float kUnseen = 0.004f;
+
+/// Whether all normals of a chunk are turned away from who looks along -z. turn: of its model.
+bool turned_away(const ChunkRecord& chunk, const glm::quat& turn) {
+  if (!(chunk.cone_cutoff <= 1.0f)) return false;
+  const glm::vec3 axis(chunk.cone_axis[0], chunk.cone_axis[1], chunk.cone_axis[2]);
+  const float spread = std::asin(chunk.cone_cutoff);
+  return std::acos(std::clamp((turn * axis).z, -1.0f, 1.0f)) - spread > std::acos(kTurnedAway);
+}
+
+void report_unseen(const BundleView& bundle, const IssueSink& sink) {
+  const auto tell = [&](WorkstationRule rule, const void* place, const char* what, NameRef name) {
+    const auto at = static_cast<const std::byte*>(place) - bundle.bytes().data();
+    sink({&workstation_issue_kind(rule), what + (" '" + std::string(bundle.name(name)) + "'"),
+          static_cast<std::uint64_t>(at), "", std::nullopt});
+  };
+  for (const PatternRecord& pattern : bundle.patterns()) {
+    if (pattern.score_version == 0 || pattern.score != 0) continue;
+    tell(WorkstationRule::kPatternUnseen, &pattern, "pattern", pattern.name);
+  }
+  for (const SceneRecord& scene : bundle.scenes()) {
+    const ModelRecord& model = bundle.models()[scene.model];
+    const glm::quat turn(scene.rotation[3], scene.rotation[0], scene.rotation[1],
+                         scene.rotation[2]);
+    bool unseen = model.chunk_count > 0;
+    for (std::uint32_t c = model.first_chunk; c < model.first_chunk + model.chunk_count; ++c) {
+      const ChunkRecord& chunk = bundle.chunks()[c];
+      const MaterialRecord& material = bundle.materials()[chunk.material];
+      const bool two_sided = (material.flags & kMaterialTwoSided) != 0;
+      unseen = unseen && (material.opacity < kUnseen || (!two_sided && turned_away(chunk, turn)));
+    }
+    if (unseen) tell(WorkstationRule::kModelUnseen, &scene, "model", model.name);
+  }
+}
+
 }  // namespace
 
 bool check_whole(std::span<const std::byte> bytes, const DeviceProfile* device,
@@ -193,6 +243,7 @@ bool check_whole(std::span<const std::byte> bytes, const DeviceProfile* device,
   if (!sound) return false;
   if (const auto bundle = BundleView::open(bytes)) {
     report_preview(*bundle, sink);
+    report_unseen(*bundle, sink);
     if (device != nullptr) check_device(*bundle, *device, sink);
   }
   return true;

@@ -47,6 +47,8 @@ enum class WorkstationRule : std::uint8_t {
   kPatternContent,
   kSceneContent,
   kSourceReader,
+  kPatternUnseen,
+  kModelUnseen,
   kCount
 };
 

@@ -79,8 +79,8 @@ TestView test_view(const GrayPicture& picture, double side, double tilt, int dir
 
 /// Features of a test view that were matched.
 struct Matched {
-  std::vector<std::array<double, 2>> held;  ///< unambiguously, in picture pixels
-  int ambiguous = 0;                        ///< elsewhere in the picture nearly as well
+  std::vector<std::array<double, 2>> held;       ///< unambiguously, in picture pixels
+  std::vector<std::array<double, 2>> ambiguous;  ///< elsewhere in the picture nearly as well
 };
 
 std::vector<Describable> describe_view(const std::vector<ViewLevel>& levels,
@@ -172,11 +172,7 @@ Matched match_view(const std::vector<ViewLevel>& levels, const TestView& test,
     }
     if (here > kSameCode) continue;
     // As the device's matcher does: the second best counts only if it is elsewhere.
-    if (here * 10 < elsewhere * 9) {
-      found.held.push_back(place);
-    } else {
-      ++found.ambiguous;
-    }
+    (here * 10 < elsewhere * 9 ? found.held : found.ambiguous).push_back(place);
   }
   return found;
 }
@@ -227,13 +223,18 @@ double sharpness_of(const std::vector<ViewLevel>& levels) {
   return halved > 0 ? edge_energy(levels[0]) / halved : 0;
 }
 
-double spread_of(const GrayPicture& picture, const std::vector<ScorePlace>& places) {
+/// Share of cells with features, those that repeat included: repetition is a cause of its own.
+double spread_of(const GrayPicture& picture, const std::vector<Matched>& views) {
   std::array<bool, kSpreadGrid * kSpreadGrid> cells{};
-  for (const ScorePlace& place : places) {
-    const int column = static_cast<int>((place.x + 0.5f) * kSpreadGrid) / picture.width;
-    const int row = static_cast<int>((place.y + 0.5f) * kSpreadGrid) / picture.height;
-    cells[static_cast<std::size_t>(std::clamp(row, 0, kSpreadGrid - 1) * kSpreadGrid +
-                                   std::clamp(column, 0, kSpreadGrid - 1))] = true;
+  for (const Matched& found : views) {
+    for (const auto* places : {&found.held, &found.ambiguous}) {
+      for (const auto& place : *places) {
+        const int column = static_cast<int>((place[0] + 0.5) * kSpreadGrid) / picture.width;
+        const int row = static_cast<int>((place[1] + 0.5) * kSpreadGrid) / picture.height;
+        cells[static_cast<std::size_t>(std::clamp(row, 0, kSpreadGrid - 1) * kSpreadGrid +
+                                       std::clamp(column, 0, kSpreadGrid - 1))] = true;
+      }
+    }
   }
   return static_cast<double>(std::count(cells.begin(), cells.end(), true)) / cells.size();
 }
@@ -558,6 +559,7 @@ struct FeatureTrial {
   int views = 0;
   double held = 0;  ///< mean of the views
   double ambiguous = 0;
+  double spread = 0;
 };
 
 FeatureTrial try_features(const std::vector<ViewLevel>& levels, unsigned jobs) {
@@ -569,9 +571,10 @@ FeatureTrial try_features(const std::vector<ViewLevel>& levels, unsigned jobs) {
   FeatureTrial trial;
   trial.views = static_cast<int>(views.size());
   trial.places = places_of(found);
+  trial.spread = spread_of(levels[0], found);
   for (const Matched& each : found) {
     trial.held += static_cast<double>(each.held.size()) / trial.views;
-    trial.ambiguous += 1.0 * each.ambiguous / trial.views;
+    trial.ambiguous += static_cast<double>(each.ambiguous.size()) / trial.views;
   }
   return trial;
 }
@@ -640,8 +643,8 @@ Result<PatternScore> score_pattern(const GrayImage& pattern, std::span<const std
       "choose larger print: lines this fine blur into gray at arm's length"};
   // Each cause's scale runs to what good patterns have: chosen on twelve pictures and on those
   // with one known fault that the tests make.
-  const int values[9] = {share_of(trial.held, 60),
-                         share_of(spread_of(levels[0], out.places), 1.0),
+  const int values[9] = {share_of(trial.held + trial.ambiguous, 60),
+                         share_of(trial.spread, 1.0),
                          share_of(contrast_of(levels[0]), 30),
                          share_of(trial.held / std::max(1.0, trial.held + trial.ambiguous), 0.5),
                          share_of(aspect, 0.6),

@@ -66,6 +66,23 @@ TEST(Device, EachBreachIsNamedWithItsAsset) {
   EXPECT_EQ(findings(bytes, device), Lines());
 }
 
+TEST(Unseen, APatternThatNoViewOfItsScoreShowsIsNamed) {
+  BundleContent content = pattern_content();
+  const auto warnings = [&content](float score) {
+    content.patterns[0].score = score;
+    content.patterns[0].score_version = score < 0 ? 0 : 1;
+    Lines found;
+    check_whole(encode(content), nullptr,
+                [&](const Issue& issue) { found.push_back(issue.kind->id + (" " + issue.where)); });
+    return found;
+  };
+  EXPECT_EQ(warnings(-1), Lines());
+  EXPECT_EQ(warnings(3), Lines());
+  const Lines found = warnings(0);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_TRUE(found[0].starts_with("PATTERN_UNSEEN pattern '")) << found[0];
+}
+
 TEST(Device, MemoryIsHeldAgainstWhatTheBundleTakes) {
   BundleContent content = texture_content();
   content.texture_data[0].resize(3u << 20);

@@ -277,6 +277,23 @@ class Check(ProgramTest):
         look = self.look_at("sheet.gltf")
         self.assertGreater(look["ssim_worst"], 0.9)
 
+    def test_what_cannot_be_seen_is_named(self):
+        # Sheets that look down into the pattern: glTF says that backs are not drawn, OBJ says nothing.
+        (self.folder / "down.bin").write_bytes(struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 0, 1))
+        (self.folder / "down.gltf").write_text(json.dumps({
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 0, 1]}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"uri": "down.bin", "byteLength": 36}]}))
+        (self.folder / "sheet.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n")
+        picture(self.folder / "p.png")
+        done = self.modar("bake", "down.gltf", "sheet.obj", "p.png", "--scene", "p=down", "--scene", "p=sheet,up=y,offset=0:20:0", *QUICK, "-o", "o.modar")
+        self.assertIn("sheet: 1 of 1 materials are on open or inside-out surfaces: both sides of them are drawn", done.stderr)
+        self.assertIn("p=sheet: its offset is 20 times the pattern's longer side", done.stderr)
+        said = self.check(0, "o.modar")
+        self.assertIn("warning MODEL_UNSEEN model 'down'", said)
+        self.assertNotIn("model 'sheet'", said)
+
     def test_rough_models_are_looked_at_in_many_samples(self):
         # Where every sample falls on another triangle, pictures of 16 samples a pixel differ by 2.75 of 255.
         side, rough = 60, random.Random(1)

@@ -189,6 +189,9 @@ TEST(Score, NamesWhatIsWrongWithAPicture) {
       EXPECT_LT(value_of(bad, id), 60) << id;
       EXPECT_LT(value_of(bad, id), value_of(good, id)) << id;
     }
+    if (std::string_view(ids[0]) == "repetition") {
+      EXPECT_GE(value_of(bad, "texture"), 60) << "what repeats is detail";
+    }
     for (const ScoreCause& cause : bad.causes) {
       // The best grade comes without advice.
       EXPECT_EQ(*cause.advice != 0, bad.grade != 'A' && cause.value < 60)
