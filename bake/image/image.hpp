@@ -40,7 +40,10 @@ inline constexpr std::uint64_t kMaxPixelsPerByte = 64;
 /// Errors: kIo "io.open"; kInvalidInput "image.decode", "image.too-large"; kUnsupported
 /// "image.ktx", "image.format", both with the command that converts the file.
 Result<RgbaImage> read_image(const std::string& path, Colours colours = Colours::kSrgb);
-/// The same from a file's bytes; `name` is what errors call it.
+/// The same of a model's texture: rows as the file stores them, since its coordinates refer to
+/// these, in Blender and in engines alike.
+Result<RgbaImage> read_texture(const std::string& path, Colours colours = Colours::kSrgb);
+/// read_image() from a file's bytes; `name` is what errors call it.
 Result<RgbaImage> decode_image(std::span<const std::byte> bytes, const std::string& name,
                                Colours colours = Colours::kSrgb);
 /// Whether read_image() gives other pixels than the file stores, as it states other colours.

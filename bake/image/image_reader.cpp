@@ -226,6 +226,13 @@ Result<RgbaImage> read_image(const std::string& path, Colours colours) {
   return decode_image(std::as_bytes(std::span(file)), path, colours);
 }
 
+Result<RgbaImage> read_texture(const std::string& path, Colours colours) {
+  MODAR_ASSIGN(const std::string file, read_file(path, kMaxFileBytes));
+  MODAR_ASSIGN(StoredImage stored, decode_stored(std::as_bytes(std::span(file)), path));
+  if (colours == Colours::kSrgb) convert_to_srgb(stored.colours, stored.image);
+  return std::move(stored.image);
+}
+
 bool states_other_colours(const std::string& path) {
   const auto file = read_file(path, kMaxFileBytes);
   constexpr std::array kSigns = {"iCCP"sv, "gAMA"sv, "cHRM"sv, "ICC_PROFILE"sv, "ICCP"sv};

@@ -228,7 +228,7 @@ bool can_be_enlarged(TextureSize source, std::uint32_t max_side) {
 Result<Texture> bake_texture(const std::string& path, const TextureOptions& options,
                              Report& report) {
   StageTimer timer(report, "texture.read");
-  MODAR_ASSIGN(const RgbaImage source, read_image(path));
+  MODAR_ASSIGN(const RgbaImage source, read_texture(path));
   timer.done(1, pixel_count(source));
   return bake_texture(source, path, options, report);
 }

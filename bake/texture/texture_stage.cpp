@@ -150,7 +150,7 @@ std::uint32_t affordable_side(const TextureUses& textures, const TextureOptions&
     if (use.image) {
       pages.push_back({use.image->width, use.image->height, !is_opaque(*use.image)});
     } else {
-      const auto image = read_image(use.path);
+      const auto image = read_texture(use.path);
       if (image) files.push_back({image->width, image->height, !is_opaque(*image)});
     }
   }
@@ -195,7 +195,8 @@ std::uint32_t merge_last(BundleContent& content) {
 
 Result<std::uint32_t> add_picture(const std::string& path, const TextureOptions& options,
                                   BundleContent& content, Report& report) {
-  MODAR_ASSIGN(const Texture baked, bake_texture(path, options, report));
+  MODAR_ASSIGN(const RgbaImage image, read_image(path));
+  MODAR_ASSIGN(const Texture baked, bake_texture(image, path, options, report));
   append_texture(baked, content);
   return merge_last(content);
 }

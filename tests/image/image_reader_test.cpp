@@ -11,6 +11,7 @@
 #include "bake/image/decoders.hpp"
 #include "bake/image/difference.hpp"
 #include "bake/io/input.hpp"
+#include "formats/base/atomic_file.hpp"
 #include "tests/texture/texture_samples.hpp"
 
 namespace modar {
@@ -300,6 +301,13 @@ TEST(ImageReader, ExifOrientationIsApplied) {
   ASSERT_EQ(turned->height, 32U);
   EXPECT_LT(turned->pixels[0], 60);
   EXPECT_GT(turned->pixels[turned->pixels.size() - 4], 200);
+  const std::string path = testing::TempDir() + "/turned.jpg";
+  ASSERT_TRUE(write_file(path, jpeg));
+  const Result<RgbaImage> texture = read_texture(path);
+  ASSERT_TRUE(texture) << to_line(texture.error());
+  EXPECT_EQ(texture->width, 32U) << "coordinates of models are of the stored rows";
+  EXPECT_LT(texture->pixels[0], 60);
+  EXPECT_GT(texture->pixels[texture->pixels.size() - 4], 200);
 }
 
 /// A JPEG's EXIF segment of an exposure: 26 mm on film, of a picture of those sides.

@@ -488,11 +488,18 @@ TEST_F(Gltf, PicturesOfWhatIsLitMirrorLightInTheirDarkPlaces) {
           R"("materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0},"metallicFactor":0}},
           {"pbrMetallicRoughness":{"baseColorTexture":{"index":0},"metallicFactor":0},
            "extensions":{"KHR_materials_unlit":{}}},
-          {"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}])",
+          {"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}},
+          {"pbrMetallicRoughness":{"baseColorFactor":[1,0,0,1]},
+           "extensions":{"KHR_materials_unlit":{}}}])",
       three_triangles());
   ASSERT_TRUE(model) << to_line(model.error());
   EXPECT_FLOAT_EQ(model->materials[0].reflectance, 0.04f) << "glTF 2.0, appendix B";
   EXPECT_EQ(model->materials[1].reflectance, 0.0f) << "unlit";
+  EXPECT_TRUE(std::any_of(model->diagnostics.begin(), model->diagnostics.end(),
+                          [](const Diagnostic& d) { return d.id == "gltf.unlit"; }))
+      << "a picture is lit all the same";
+  EXPECT_EQ(model->materials[3].emission, glm::vec3(1, 0, 0)) << "a colour is not";
+  EXPECT_EQ(model->materials[3].diffuse, glm::vec3(0.0f));
   EXPECT_EQ(model->materials[2].metalness, 0.0f) << "a file that states nothing means no metal";
 }
 

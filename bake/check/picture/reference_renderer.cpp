@@ -80,7 +80,7 @@ Result<std::vector<SoftTexture>> load_textures(const TriMesh& mesh, unsigned job
   const std::vector<std::uint32_t> repeats = repeating_materials(mesh);
   for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
     if (mesh.uvs.empty() || mesh.materials[m].diffuse_map.empty()) continue;
-    MODAR_ASSIGN(const RgbaImage image, read_image(mesh.materials[m].diffuse_map));
+    MODAR_ASSIGN(const RgbaImage image, read_texture(mesh.materials[m].diffuse_map));
     textures[m].wrap = texture_wrap(repeats[m]);
     textures[m].levels = mip_chain(image, filters_across(repeats[m]), jobs);
   }

@@ -12,6 +12,7 @@
 #include <optional>
 #include <span>
 #include <system_error>
+#include <utility>
 
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
@@ -24,6 +25,7 @@
 #include "bake/import/read_model.hpp"
 #include "bake/import/reflection.hpp"
 #include "formats/base/atomic_file.hpp"
+#include "formats/base/leftover.hpp"
 
 namespace modar {
 namespace {
@@ -40,6 +42,7 @@ class TemporaryFolder {
       std::string name = base + "/modar-gltf-XXXXXX";
       if (base.empty() || ::mkdtemp(name.data()) == nullptr) continue;
       path_ = name;
+      leftovers_.emplace_back(path_);
       return;
     }
   }
@@ -50,9 +53,15 @@ class TemporaryFolder {
     if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
   }
   [[nodiscard]] const std::string& path() const { return path_; }
+  /// Of a file or folder in it.
+  std::string with(std::string path) {
+    leftovers_.emplace_back(path);
+    return path;
+  }
 
  private:
   std::string path_;
+  std::vector<Leftover> leftovers_;
 };
 
 /// The letters, digits, '-' and '_' of a name; `other` if nothing is left.
@@ -207,6 +216,7 @@ class MaterialReader {
     set_pictures(source, m);
     m.beyond = beyond(picture_of(source));
     set_normal_map(source, m);
+    if (source.extensions.count("KHR_materials_unlit") != 0) set_unlit(m);
     m.opacity *= 1 - kClear * transmission_of(source);
     m.ambient = m.diffuse;
     if (folder_of_images_ != nullptr) m.keeper = folder_of_images_;
@@ -256,6 +266,8 @@ class MaterialReader {
                                        })),
         "have a specular-glossiness map; half of their glossiness sets the highlight of the whole "
         "material");
+    add("gltf.unlit", lit_,
+        "are stated as unlit (KHR_materials_unlit), and their pictures are lit by the scene");
     add("gltf.alpha-mask", cut_out_,
         "are cut out at an alpha value: lower values are transparent, the others opaque");
   }
@@ -282,6 +294,22 @@ class MaterialReader {
       set_reflection(map.roughness, map.metalness, map.base, map.pictured, m);
     } else {
       metal_maps_.push_back(map);
+    }
+  }
+
+  /// A plain colour is emitted; pictures and colours of vertices are lit.
+  void set_unlit(SourceMaterial& m) {
+    const int number = static_cast<int>(count_) - 1;
+    bool plain = m.diffuse_map.empty();
+    for (const tinygltf::Mesh& mesh : gltf_.meshes) {
+      for (const tinygltf::Primitive& primitive : mesh.primitives) {
+        plain = plain && (primitive.material != number || !primitive.attributes.count("COLOR_0"));
+      }
+    }
+    if (plain) {
+      m.emission = std::exchange(m.diffuse, glm::vec3(0.0f));
+    } else {
+      ++lit_;
     }
   }
 
@@ -371,10 +399,10 @@ class MaterialReader {
     std::error_code error;
     std::string folder = folder_of_images_->path();
     for (int i = 2; std::filesystem::exists(folder + "/" + name, error); ++i) {
-      folder = folder_of_images_->path() + "/" + std::to_string(i);
+      folder = folder_of_images_->with(folder_of_images_->path() + "/" + std::to_string(i));
       std::filesystem::create_directory(folder, error);
     }
-    return folder + "/" + name;
+    return folder_of_images_->with(folder + "/" + name);
   }
 
   /// A picture that cannot be read is left out.
@@ -448,7 +476,7 @@ class MaterialReader {
   /// glTF 2.0, 3.8.2: what files state of their colours is ignored. A path of the stored pixels.
   std::string as_stored(const std::string& path) {
     if (path.empty() || !states_other_colours(path)) return path;
-    const auto image = read_image(path, Colours::kStored);
+    const auto image = read_texture(path, Colours::kStored);
     if (!image) return path;
     const std::string copy = new_picture(std::filesystem::path(path).stem().string() + ".png");
     return write_png(*image, copy) ? copy : path;
@@ -484,6 +512,7 @@ class MaterialReader {
   std::vector<MetalMap> metal_maps_;
   std::uint32_t count_ = 0;
   Count emissive_;
+  int lit_ = 0;  // of unlit ones
   Count occlusion_;
   int normals_left_out_ = 0;
   int cut_out_ = 0;

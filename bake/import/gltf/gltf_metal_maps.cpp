@@ -207,7 +207,7 @@ void apply_metal_maps(const std::vector<MetalMap>& maps, const std::string& labe
   for (const MetalMap& map : maps) {
     const auto [found, added] = read.try_emplace(map.path);
     if (added) {
-      if (const auto image = read_image(map.path)) {
+      if (const auto image = read_texture(map.path)) {
         found->second = shrunk(*image);
       } else {
         const Error& e = image.error();

@@ -16,7 +16,7 @@ constexpr double kOccludedShare = 0.5;
 /// A picture at the size of another, where it has a path.
 Result<RgbaImage> read_as_large(const std::string& path, const RgbaImage& other) {
   if (path.empty()) return RgbaImage();
-  MODAR_ASSIGN(RgbaImage image, read_image(path));
+  MODAR_ASSIGN(RgbaImage image, read_texture(path));
   if (image.width == other.width && image.height == other.height) return image;
   return resize(image, other.width, other.height, {.repeat = true});
 }
@@ -57,7 +57,7 @@ Result<std::optional<RgbaImage>> fold_pictures(const GltfPictures& pictures) {
   if (alone && (pictures.colour.empty() || pictures.alpha == GltfPictures::Alpha::kKept)) {
     return std::nullopt;
   }
-  MODAR_ASSIGN(RgbaImage image, read_image(pictures.first()));
+  MODAR_ASSIGN(RgbaImage image, read_texture(pictures.first()));
   if (alone && is_opaque(image) && alpha_of(pictures, 255) == 255) return std::nullopt;
   if (pictures.colour.empty()) std::fill(image.pixels.begin(), image.pixels.end(), 255);
   MODAR_ASSIGN(const RgbaImage emissive, read_as_large(pictures.emissive, image));

@@ -619,9 +619,16 @@ void ObjMaterials::resolve(const ModelFolder& folder, const std::string& label, 
     if (std::find(read.begin(), read.end(), path) != read.end()) continue;
     read.push_back(path);
     model.files.push_back(path);
-    for (SourceMaterial& m :
-         parse_mtl(read_file(path, kMaxMtlBytes).value_or(""), {folder_of(path), folder.within},
-                   name_of(path), diagnostics, &model.files)) {
+    const Result<std::string> text = read_file(path, kMaxMtlBytes);
+    const bool sound = text && text->find('\0') == std::string::npos;
+    if (!sound) {
+      const Error error = text ? Error{} : text.error();
+      diagnostics.push_back({"obj.unreadable-mtl", DiagnosticSeverity::kWarning, path, 0,
+                             text ? "the material file is not text" : error.cause,
+                             text ? "export the model again" : error.cure});
+    }
+    for (SourceMaterial& m : parse_mtl(sound ? *text : "", {folder_of(path), folder.within},
+                                       name_of(path), diagnostics, &model.files)) {
       std::string name = m.name;
       if (used_.size() == 1 && defined.empty()) {
         materials[0] = m;

@@ -455,6 +455,13 @@ Result<SourceModel> parse_source(const ByteSource& source, const ModelFolder& fo
     model.name = stem;
     MODAR_TRY(parse_once(source, folder, label, {1, options.own_picture}, &*bad, model));
   }
+  if (model.face_count() == 0 && model.lost_faces > 0) {
+    const Diagnostic& why = model.diagnostics.front();
+    return fail(
+        ExitCode::kInvalidInput, "obj.no-faces", label,
+        "none of its " + std::to_string(model.lost_faces) + " faces can be used: " + why.message,
+        "export the model again");
+  }
   if (model.face_count() == 0) {
     return fail(
         ExitCode::kInvalidInput, "obj.no-faces", label,

@@ -269,7 +269,7 @@ Result<Pages> draw_pages(const TriMesh& mesh, const Plan& plan, const TextureUse
   for (std::uint32_t s = 0; s < plan.sheets.size(); ++s) {
     const Sheet& sheet = plan.sheets[s];
     const AtlasSize size = sheet.scaled(plan.step);
-    MODAR_ASSIGN(RgbaImage image, read_image(textures.uses[sheet.use].path));
+    MODAR_ASSIGN(RgbaImage image, read_texture(textures.uses[sheet.use].path));
     if (size.width != sheet.width || size.height != sheet.height) {
       const CoverageMask shown = shown_of(mesh, plan, s, {sheet.width, sheet.height});
       const auto there_and_back = [&](std::uint32_t width, std::uint32_t height) {
@@ -498,7 +498,7 @@ std::vector<Sheet> find_sheets(const AtlasOptions& options, const std::vector<st
   }
   if (candidates.size() < 2 && options.mode != AtlasMode::kAlways) return sheets;
   for (const std::uint32_t use : candidates) {
-    const auto image = read_image(textures.uses[use].path);
+    const auto image = read_texture(textures.uses[use].path);
     if (!image) continue;  // told where it is baked
     const TextureSize apart = texture_size({image->width, image->height}, options.textures);
     const double scale =

@@ -412,7 +412,7 @@ RgbaImage normals_of_heights(const RgbaImage& heights) {
 }
 
 Result<RgbaImage> read_normals(const NormalMap& normal) {
-  MODAR_ASSIGN(RgbaImage map, read_image(normal.path, Colours::kStored));
+  MODAR_ASSIGN(RgbaImage map, read_texture(normal.path, Colours::kStored));
   if (normal.may_be_heights && holds_heights(map)) return normals_of_heights(map);
   return map;
 }
@@ -440,7 +440,7 @@ RgbaImage white_picture(const RgbaImage& map, std::uint32_t max_side) {
 Result<RgbaImage> read_colours(const ReliefGroup& group, const RgbaImage& map,
                                const ReliefOptions& options) {
   if (group.colour.empty()) return white_picture(map, options.max_side);
-  MODAR_ASSIGN(RgbaImage image, read_image(group.colour));
+  MODAR_ASSIGN(RgbaImage image, read_texture(group.colour));
   const glm::dvec2 span = spanned(map, group.normal, image);
   double scale = std::max({1.0, std::min(span.x, span.y)});
   scale = std::min(scale, double(options.max_side) / std::max(image.width, image.height));
