@@ -3,11 +3,13 @@
 
 #include "bake/commands/commands.hpp"
 #include "bake/io/terminal.hpp"
+#include "formats/base/leftover.hpp"
 #include "modar/features.hpp"
 #include "modar/mapped_file.hpp"
 
 int main(int argc, char** argv) {
   modar::guard_mapped_files();
+  modar::remove_leftovers_at_signals();
   modar::use_baseline_instructions();
   const int code = modar::guarded([&] {
     modar::CommandLine program("Bake models and pictures for augmented reality on old phones",

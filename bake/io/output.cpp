@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
@@ -16,6 +17,8 @@
 #include "bake/io/terminal.hpp"
 #include "bake/json.hpp"
 #include "formats/base/atomic_file.hpp"
+#include "formats/base/ranges.hpp"
+#include "formats/base/utf8.hpp"
 #include "formats/trim.hpp"
 
 namespace modar {
@@ -46,6 +49,15 @@ void remove_left_staging(const std::string& folder) {
 
 Result<void> make_output_folder(const std::string& folder) {
   std::error_code error;
+  constexpr std::array kFiles = {".png",  ".jpg", ".jpeg", ".webp", ".pdf", ".html", ".txt",
+                                 ".json", ".csv", ".zip",  ".mp4",  ".obj", ".glb",  ".modar"};
+  if (const std::string ending = ascii_lower(fs::path(folder).extension().string());
+      !fs::exists(folder, error) &&
+      ranges::any_of(kFiles, [&](auto* one) { return ending == one; })) {
+    return fail(ExitCode::kUsage, "out.folder", folder,
+                "a folder is written, and this names a file",
+                "name a folder, or make this one first");
+  }
   fs::create_directories(folder, error);
   if (error) {
     return fail(ExitCode::kIo, "io.folder", folder, error.message(),
@@ -57,14 +69,18 @@ Result<void> make_output_folder(const std::string& folder) {
 OutputFolder::OutputFolder(std::string folder, bool made)
     : folder_(std::move(folder)),
       staging_(path(std::string(kStaging) + std::to_string(::getpid()))),
-      made_(made) {}
+      made_(made) {
+  leftovers_.emplace_back(staging_);
+  if (made_) leftovers_.emplace_back(folder_);
+}
 
 OutputFolder::OutputFolder(OutputFolder&& other) noexcept
     : folder_(std::move(other.folder_)),
       staging_(std::exchange(other.staging_, std::string())),
       made_(other.made_),
       marked_(other.marked_),
-      names_(std::move(other.names_)) {}
+      names_(std::move(other.names_)),
+      leftovers_(std::move(other.leftovers_)) {}
 
 OutputFolder::~OutputFolder() {
   std::error_code ignored;
@@ -95,6 +111,7 @@ Result<OutputFolder> OutputFolder::claim(const std::string& folder, bool force) 
   }
   MODAR_TRY(write_file(output.path(kFolderMark), mark));
   output.marked_ = true;
+  output.leftovers_.emplace_back(output.path(kFolderMark));
   return output;
 }
 
@@ -102,12 +119,16 @@ Result<void> OutputFolder::write(const std::string& name, std::span<const std::b
   const fs::path file = fs::path(staging_) / name;
   MODAR_TRY(make_output_folder(file.parent_path().string()));
   names_.push_back(name);
+  leftovers_.emplace_back(file.parent_path().string());
+  leftovers_.emplace_back(file.string());
   auto written = write_file(file.string(), bytes);
   if (!written) written.error().where = path(name);
   return written;
 }
 
 Result<void> OutputFolder::commit() {
+  // Files that are in their places need the mark.
+  leftovers_.erase(leftovers_.begin() + 1, leftovers_.end());
   for (const std::string& name : names_) {
     MODAR_TRY(make_output_folder(fs::path(path(name)).parent_path().string()));
     std::error_code error;

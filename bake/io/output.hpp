@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "formats/base/error.hpp"
+#include "formats/base/leftover.hpp"
 
 namespace modar {
 
@@ -46,6 +47,7 @@ class OutputFolder {
   bool made_ = false;
   bool marked_ = false;  ///< claim() has written the mark into the folder
   std::vector<std::string> names_;
+  std::vector<Leftover> leftovers_;
 };
 
 /// Refuses an output that is one of the inputs: by its path, a symbolic link or a hard link.

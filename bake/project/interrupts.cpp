@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <thread>
 
+#include "formats/base/leftover.hpp"
+
 namespace modar {
 
 struct Interrupts::Watch {
@@ -22,6 +24,7 @@ struct Interrupts::Watch {
     if (::sigwait(&signals, &signal) != 0 || stop) return;
     const std::lock_guard lock(writing);
     std::fputs("\nmodar: interrupted; finished parts stay in the cache\n", stderr);
+    remove_leftovers();
     ::_exit(128 + signal);
   }
 };

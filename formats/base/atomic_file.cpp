@@ -74,12 +74,15 @@ const char* cure_of_writing(int number) {
 }
 
 AtomicFile::AtomicFile(int descriptor, std::string path, std::string temporary)
-    : descriptor_(descriptor), path_(std::move(path)), temporary_(std::move(temporary)) {}
+    : descriptor_(descriptor), path_(std::move(path)), temporary_(std::move(temporary)) {
+  if (!temporary_.empty()) leftover_ = Leftover(temporary_);
+}
 
 AtomicFile::AtomicFile(AtomicFile&& other) noexcept
     : descriptor_(std::exchange(other.descriptor_, -1)),
       path_(std::move(other.path_)),
-      temporary_(std::exchange(other.temporary_, std::string())) {}
+      temporary_(std::exchange(other.temporary_, std::string())),
+      leftover_(std::move(other.leftover_)) {}
 
 AtomicFile::~AtomicFile() {
   if (descriptor_ >= 0) ::close(descriptor_);

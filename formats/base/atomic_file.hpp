@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "formats/base/error.hpp"
+#include "formats/base/leftover.hpp"
 
 namespace modar {
 
@@ -35,6 +36,7 @@ class AtomicFile {
   int descriptor_ = -1;
   std::string path_;
   std::string temporary_;
+  Leftover leftover_;
 };
 
 /// Syncs a folder, so that new and renamed files in it survive a power cut. False: see

@@ -15,6 +15,7 @@
 #include "modar/renderer.hpp"
 #include "pipeline.hpp"
 #include "play.hpp"
+#include "player.hpp"
 #include "screen.hpp"
 
 namespace modar {
@@ -142,6 +143,7 @@ Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle
   TurntableReport turn;
   turn.pattern = !models;
   FrameReport report;
+  catch_interrupts();
   for (std::uint32_t n = first; n < count; ++n) {
     const Subject subject = subject_of(bundle, n);
     if (subject.items.empty()) continue;
@@ -162,6 +164,11 @@ Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle
       screen->draw({}, camera, items);
       const RgbaView picture = screen->picture();
       MODAR_TRY(file.intact());
+      if (was_interrupted()) {
+        return fail(ExitCode::kIo, "play.interrupted", options.out,
+                    "the run was interrupted after " + std::to_string(turn.frame) + " frames",
+                    "start it again");
+      }
       turn.render_ms = ms_since(before);
       turn.triangles = screen->stats().triangles;
       turn.draw_calls = screen->stats().draw_calls;

@@ -49,6 +49,26 @@ class AtomicFileTest : public ::testing::Test {
   fs::path folder_;
 };
 
+TEST_F(AtomicFileTest, SignalsLeaveNothing) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    const pid_t child = fork();
+    if (child == 0) {
+      modar::remove_leftovers_at_signals();
+      fs::create_directory(folder_ / "made");
+      const modar::Leftover folder((folder_ / "made").string());
+      auto file = modar::AtomicFile::create((folder_ / "made" / "file").string());
+      auto done = modar::AtomicFile::create(path());
+      if (!file || !done || !done->commit()) _exit(1);
+      raise(signal);
+      _exit(2);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == signal) << status;
+    EXPECT_EQ(files(), 1) << "a committed file stays";
+  }
+}
+
 TEST_F(AtomicFileTest, ReplacesOnlyAtCommit) {
   ASSERT_TRUE(modar::write_file(path(), "old"));
   auto file = modar::AtomicFile::create(path());
