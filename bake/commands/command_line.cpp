@@ -286,8 +286,12 @@ Error usage_error(const CLI::ParseError& thrown, const CLI::Option* option,
     error.cause = quoted + " is not one of its values";
     error.cure = meant.empty() ? "name one of " + list : "did you mean " + std::string(meant) + "?";
   } else {
-    error.cause = quoted + (number_in(value) ? " is out of range" : " is not a number");
-    error.cure = number_cure(rules, name);
+    const bool size = option->get_type_name() == "SIZE";
+    error.cause = size               ? "it is no size"
+                  : number_in(value) ? quoted + " is out of range"
+                                     : quoted + " is not a number";
+    error.cure =
+        size ? "write bytes, or a number with k, M or G, as in 800M" : number_cure(rules, name);
   }
   return error;
 }

@@ -105,7 +105,7 @@ double cross(const Point& a, const Point& b) {
 }
 
 double norm_of(const Point& a) {
-  return std::hypot(a.x, a.y);
+  return std::sqrt(a.x * a.x + a.y * a.y);
 }
 
 /// Gradients across all colours: of each pixel that of the channel which changes most.
@@ -141,7 +141,7 @@ struct Gradients {
     const double gy = static_cast<double>(dy.at<float>(y, x));
     const double strength = gx * normal.x + gy * normal.y;
     // A gradient that points elsewhere by more than 30 degrees belongs to something else.
-    return std::fabs(strength) > 0.87 * std::hypot(gx, gy) ? strength : 0;
+    return std::fabs(strength) > 0.87 * std::sqrt(gx * gx + gy * gy) ? strength : 0;
   }
 };
 
@@ -510,8 +510,9 @@ double sharp_along(const Gradients& gradients, const Point& from, const Point& t
       return std::fabs(gradients.across(at + off * normal, normal));
     };
     const double here = std::max({strength(0), strength(-0.7), strength(0.7)});
+    if (here <= kEdge) continue;
     const bool lone = !alone || std::max(strength(-3), strength(3)) < kShadow * here;
-    if (here > kEdge && here >= std::max(strength(-2), strength(-3)) && lone) ++sharp;
+    if (here >= std::max(strength(-2), strength(-3)) && lone) ++sharp;
   }
   return static_cast<double>(sharp) / kPlaces;
 }
@@ -904,8 +905,9 @@ const Figure& outermost(const std::vector<Figure>& figures) {
 tl::unexpected<Error> not_found(const char* cause) {
   return fail(
       ExitCode::kInvalidInput, "rectify.not-found", "", cause,
-      "pass the four corners with --corners, or take a photo that shows all edges on a plain "
-      "background; a scan or a frontal picture is baked unchanged");
+      "pass the pixels of the four corners with --corners (`modar studio` shows the photo, to set "
+      "them on it), or take a photo that shows all edges on a plain background; a scan or a "
+      "frontal picture is baked unchanged");
 }
 
 /// Another figure of about the same score that is neither within the best one nor nearly it.

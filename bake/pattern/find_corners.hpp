@@ -17,7 +17,7 @@ inline constexpr double kDoubtfulSharpness = 0.92;
 inline constexpr double kClear = 0.8;
 inline constexpr double kClearEdge = 0.9;
 /// Of sides that divide an object from a background with edges around it.
-inline constexpr double kClearFramed = 0.95;
+inline constexpr double kClearFramed = 0.99;
 /// Of each quarter of sides that the background tells nothing of: below, one of their ends may be
 /// on another edge.
 inline constexpr double kSureQuarter = 0.86;

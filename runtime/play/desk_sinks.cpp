@@ -1,4 +1,7 @@
 // Folders of PNG and H.264 movies; the library of media encodes both.
+#include <sys/stat.h>
+
+#include <cctype>
 #include <cstdio>
 
 #include "desk_media.hpp"
@@ -38,6 +41,19 @@ std::string parent_of(const std::string& path) {
   return slash == std::string::npos ? "." : path.substr(0, slash + 1);
 }
 
+/// "x.txt": a new name with an ending of 2 to 4 letters and digits, of which the first is a letter.
+bool named_as_file(const std::string& path) {
+  const std::size_t dot = path.rfind('.');
+  if (dot == std::string::npos || dot == 0 || path[dot - 1] == '/') return false;
+  const std::string_view ending = std::string_view(path).substr(dot + 1);
+  if (ending.size() < 2 || ending.size() > 4 || std::isdigit(ending[0]) != 0) return false;
+  for (const char c : ending) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0) return false;
+  }
+  struct stat there {};
+  return ::stat(path.c_str(), &there) != 0 || !S_ISDIR(there.st_mode);
+}
+
 }  // namespace
 
 Result<void> write_png(const std::string& path, const RgbaView& image) {
@@ -49,13 +65,12 @@ Result<void> write_frame_picture(const std::string& path, const RgbImage& image)
 }
 
 Result<std::unique_ptr<FrameSink>> open_frame_sink(const std::string& out, double fps) {
-  for (const char* other : {".avi", ".mkv", ".mov", ".webm", ".gif", ".png", ".jpg"}) {
-    if (out.ends_with(other)) {
-      return fail(ExitCode::kUsage, "out.format", out, "it is neither FILE.mp4 nor a folder",
-                  "name a movie FILE.mp4, or a folder for pictures");
-    }
-  }
   const bool movie = out.ends_with(".mp4");
+  if (!movie && named_as_file(out)) {
+    return fail(ExitCode::kUsage, "out.format", out, "it is neither FILE.mp4 nor a folder",
+                "name a movie FILE.mp4, or a folder for pictures: with a slash at its end, as " +
+                    out + "/, if its name is meant to end like this");
+  }
   MODAR_TRY(make_folder(movie ? parent_of(out) : out));
   if (movie) {
     MODAR_ASSIGN(const Media* library, media());

@@ -193,6 +193,15 @@ class WrongFiles(ProgramTest):
         for words in (("--model", "good.png"), ("--pattern", "good.stl")):
             self.assert_fails(self.modar("bake", *words, "-o", "out.modar"), 1, "this is a ", "pass it as a ")
 
+    def test_what_is_wrong_with_a_model_is_named(self):
+        corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+        (self.folder / "beyond.obj").write_text(corners + "f 1 2 9\nf 1 2 7\n")
+        self.assert_fails(self.modar("bake", "beyond.obj", "-o", "o.modar"), 3, "none of its 2 faces can be used: ", "refer to vertices that do not exist")
+        (self.folder / "plain.obj").write_text("mtllib odd.mtl\nusemtl a\n" + corners + "f 1 2 3\n")
+        (self.folder / "odd.mtl").write_bytes(b"newmtl a\n\0\1\2")
+        self.assertIn("odd.mtl: the material file is not text", self.modar("bake", "plain.obj", "-o", "o.modar").stderr)
+        self.assert_fails(self.modar("bake", "plain.obj", "-o", "o.modar", "--memory", "1X"), 1, "--memory: it is no size; write bytes, or a number with k, M or G")
+
     def test_an_address_is_no_file(self):
         address = "https://museum.org/a"
         for words in (("bake", f"{address}.png", "-o", "o.modar"), ("bake", f"{address}.obj", "-o", "o.modar"), ("bake", "good.stl", "--light", address, "good.png", "-o", "o.modar"),

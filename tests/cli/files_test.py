@@ -98,6 +98,8 @@ class Inputs(ProgramTest):
         path, _ = self.aliases(COVER)
         self.assert_kept(path, self.modar("pattern", "score", path, "--overlay", "."))
         self.assert_kept(path, self.modar("pattern", "simulate", path, "--picture", self.folder, "--quiet"))
+        for words in (("simulate", path, "--picture", "new.png"), ("score", path, "--overlay", "new.txt")):
+            self.assert_fails(self.modar("pattern", *words), 1, "out.folder", "a folder is written, and this names a file")
         bundle = self.folder / "b.modar"
         model = self.folder / "cover.obj"
         model.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")

@@ -4,6 +4,7 @@ import math
 import os
 import re
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -309,6 +310,21 @@ class Play(ProgramTest):
         self.assertEqual([line["angle_deg"] for line in lines_of(done)], [0.0, 120.0, 240.0])
         pictures = [path.read_bytes() for path in sorted((self.folder / "turn").iterdir())]
         self.assertEqual(len(set(pictures)), 3)
+
+    def test_an_interrupted_turntable_leaves_nothing(self):
+        bundle = self.bake_demo()
+        out = self.folder / "movie"
+        out.mkdir()
+        words = [BIN / "modar-play", bundle, "--turntable", "99999", "--size", "96x64", "--json", "--out", out / "t.mp4"]
+        with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            process.stdout.readline()
+            self.assertNotEqual(list(out.iterdir()), [])
+            process.send_signal(signal.SIGINT)
+            process.stdout.read()
+            self.assertIn(b"interrupted after", process.stderr.read())
+        self.assertEqual(list(out.iterdir()), [])
+        self.assert_fails(self.play(bundle, "--turntable", "2", "--out", "x.txt"), 1, "FILE.mp4, or a folder", "x.txt/")
+        self.assertFalse((self.folder / "x.txt").exists())
 
     def test_a_film_alone_turns_with_its_poster(self):
         done = self.play(bake_film(self), "--turntable", "3", "--out", "turn", "--size", "96x64", "--json")

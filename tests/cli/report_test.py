@@ -147,6 +147,8 @@ class Report(ProgramTest):
         before = bundle.read_bytes()
         self.assert_fails(self.modar("report", bundle, "-o", bundle), 1, "out.input")
         self.assertEqual(bundle.read_bytes(), before)
+        self.assert_fails(self.modar("report", bundle, "-o", "rep.png"), 1, "out.format", "the report is a page in HTML")
+        self.assertFalse((self.folder / "rep.png").exists())
 
 
 if __name__ == "__main__":

@@ -26,6 +26,11 @@ struct ReportCommand {
 
 Result<ExitCode> run_report(ReportCommand& command) {
   MODAR_TRY(keep_inputs(command.output, {command.bundle, command.bake_file}));
+  const std::string ending = std::filesystem::path(command.output).extension().string();
+  if (!ending.empty() && ending != ".html" && ending != ".htm") {
+    return fail(ExitCode::kUsage, "out.format", command.output, "the report is a page in HTML",
+                "name it FILE.html");
+  }
   MODAR_TRY(keep_other_kinds(command.output, "page of modar report", [](std::string_view start) {
     return start.find("content=\"modar report\"") != std::string_view::npos;
   }));
