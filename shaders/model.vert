@@ -72,8 +72,9 @@ uniform vec4 u_specular;
 uniform vec4 u_emission;
 // Of the reflection: factors on the linear and quadratic parts of the sky, the share straight on and the increase at a grazing angle.
 uniform vec4 u_mirror;
-// The mean colour that light is multiplied with, linear: a highlight is added to it, by the share in w.
-uniform vec4 u_albedo;
+// The share of the highlight that the surface shows besides its own light.
+uniform float u_share;
+// Squares of added light in sRGB.
 varying vec3 v_shine;
 #endif
 #ifdef TEXTURED
@@ -185,14 +186,11 @@ void main() {
   added += mirrored * (u_mirror.z + u_mirror.w * e * e * e * e * e);
   vec3 halfway = normalize(u_key.xyz - ray);
   vec3 shine = u_specular.rgb * pow(max(dot(n, halfway), 0.0001), u_specular.w);
-  added += u_albedo.w * shine;
+  added += u_share * shine;
   light = mix(light, mirrored + shine, u_emission.w);
 #endif
-  vec3 lit = u_albedo.rgb * light;
-#ifdef COLOURED
-  lit *= a_colour.rgb * a_colour.rgb;
-#endif
-  v_shine = encode(lit + added) - encode(lit);
+  vec3 stored = max(1.055 * pow(max(added, 0.0001), vec3(1.0 / 2.4)) - 0.055, 0.0);
+  v_shine = stored * stored;
 #endif
   v_light = u_diffuse.rgb * encode(light);
 #ifdef TEXTURED

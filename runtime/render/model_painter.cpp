@@ -327,13 +327,8 @@ void ModelPainter::set_material(const PaintJob& job, ProgramState& state, const 
     set_vector(program.emission, linear_colour(record.emission, 1.0f, metalness), job.stats);
     const float reflectance = material_share(record.flags, kMaterialReflectance);
     set_vector(program.mirror, mirror_factors(record.shininess, reflectance, metalness), job.stats);
-    glm::vec4 albedo(linear(colour), metalness > 0.0f ? reflectance * (1.0f - metalness) : 1.0f);
-    if (program.key.textured) {
-      const Rgb8 mean = job.textures.mean(record.texture);
-      for (int c = 0; c < 3; ++c)
-        albedo[c] *= linear(static_cast<float>(mean[static_cast<std::size_t>(c)]) / 255.0f);
-    }
-    set_vector(program.albedo, albedo, job.stats);
+    glUniform1f(program.share, metalness > 0.0f ? reflectance * (1.0f - metalness) : 1.0f);
+    job.stats.bytes_uploaded += sizeof metalness;
   }
   glUniform1f(program.opacity, record.opacity * opacity);
   job.stats.bytes_uploaded += sizeof record.opacity;

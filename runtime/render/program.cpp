@@ -139,7 +139,7 @@ Result<ModelProgram> make_model_program(const ProgramKey& key) {
   program.specular = place("u_specular");
   program.emission = place("u_emission");
   program.mirror = place("u_mirror");
-  program.albedo = place("u_albedo");
+  program.share = place("u_share");
   program.opacity = place("u_opacity");
   glUseProgram(program.id);
   glUniform1i(place("u_texture"), 0);

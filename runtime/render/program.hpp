@@ -45,7 +45,7 @@ struct ModelProgram {
   GLint specular = -1;
   GLint emission = -1;
   GLint mirror = -1;
-  GLint albedo = -1;
+  GLint share = -1;
   GLint opacity = -1;
 };
 

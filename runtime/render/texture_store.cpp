@@ -2,7 +2,6 @@
 #include "runtime/render/texture_store.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include "formats/base/bits.hpp"
 #include "formats/texture_format.hpp"
@@ -15,32 +14,6 @@ namespace {
 
 bool power_of_two(const TextureRecord& texture) {
   return is_power_of_two(texture.width) && is_power_of_two(texture.height);
-}
-
-/// Side of the mip level whose texels are averaged. Smaller lets few bright texels dominate, larger
-/// ignores small parts. [1, 32]
-constexpr std::uint32_t kMeanSide = 32;
-
-/// Middle gray where the texture has no level so small.
-Rgb8 mean_of(const BundleView& bundle, std::uint32_t texture) {
-  Rgb8 mean{127, 127, 127};
-  const TextureRecord& record = bundle.textures()[texture];
-  for (std::uint32_t l = 0; l < record.level_count; ++l) {
-    const TextureLevelRecord& level = bundle.texture_levels()[record.first_level + l];
-    if (std::max(level.width, level.height) > kMeanSide) continue;
-    const auto bytes = bundle.texture_data(texture).subspan(static_cast<std::size_t>(level.offset),
-                                                            static_cast<std::size_t>(level.size));
-    std::array<std::uint8_t, 3 * kMeanSide * kMeanSide> pixels;
-    find_texture_format(record.format)->decode(bytes, level.width, level.height, 3, pixels);
-    const std::uint32_t count = level.width * level.height;
-    for (std::size_t c = 0; c < 3; ++c) {
-      std::uint32_t sum = 0;
-      for (std::uint32_t i = 0; i < count; ++i) sum += pixels[3 * i + c];
-      mean[c] = static_cast<std::uint8_t>(sum / count);
-    }
-    break;
-  }
-  return mean;
 }
 
 }  // namespace
@@ -56,7 +29,6 @@ TextureStore::TextureStore(const BundleView& bundle, const GlCaps& caps)
   first_level_.assign(count, 0);
   colours_.assign(count, 0);
   alphas_.assign(count, 0);
-  for (std::uint32_t i = 0; i < count; ++i) means_.push_back(mean_of(bundle, i));
   for (const MaterialRecord& material : bundle.materials()) {
     const std::uint32_t texture = material.texture;
     if (texture != kNone) used_[texture] = true;

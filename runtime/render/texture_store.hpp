@@ -1,7 +1,6 @@
 // The bundle's textures in GL: compressed blocks straight from the mapped bytes, or decoded to RGB.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -11,8 +10,6 @@
 #include "runtime/render/gl.hpp"
 
 namespace modar {
-
-using Rgb8 = std::array<std::uint8_t, 3>;
 
 class TextureStore {
  public:
@@ -41,8 +38,6 @@ class TextureStore {
   /// 0 if none.
   [[nodiscard]] GLuint colour(std::uint32_t texture) const { return colours_[texture]; }
   [[nodiscard]] GLuint alpha(std::uint32_t texture) const { return alphas_[texture]; }
-  /// The texture's mean colour, which is its coarsest level.
-  [[nodiscard]] Rgb8 mean(std::uint32_t texture) const { return means_[texture]; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   [[nodiscard]] std::uint64_t uploaded_bytes() const { return uploaded_bytes_; }
 
@@ -83,7 +78,6 @@ class TextureStore {
   std::vector<std::uint32_t> first_level_;  ///< finest one that is uploaded
   std::vector<GLuint> colours_;
   std::vector<GLuint> alphas_;
-  std::vector<Rgb8> means_;
   std::vector<std::uint8_t> decoded_;
   std::vector<PendingUpload> pending_;
   std::vector<std::uint32_t> shown_;  ///< after expect_wanted(): the finest level that is there

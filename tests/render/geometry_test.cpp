@@ -232,7 +232,7 @@ double mirrored_part(double reflectance, double roughness, double cosine) {
 std::uint8_t mirroring_channel(const Finish& finish, const RoomLight& light, const glm::dvec3& n,
                                const glm::dvec3& ray, std::size_t c) {
   const auto factor = [](double x) { return 1.05 * std::sqrt(x) - 0.05 * x; };
-  const double albedo = std::pow((finish.colour + 0.055) / 1.055, 2.4);
+  const auto linear = [](double x) { return std::pow((x + 0.055) / 1.055, 2.4); };
   const double seen =
       std::max(0.0, seen_along(light, glm::reflect(ray, n), finish.shininess, static_cast<int>(c)));
   const double roughness = std::pow(2 / (finish.shininess + 2), 0.25);
@@ -240,8 +240,8 @@ std::uint8_t mirroring_channel(const Finish& finish, const RoomLight& light, con
                           ? mirrored_part(finish.reflectance, roughness, std::abs(glm::dot(n, ray)))
                           : 0.0;
   const double body = glm::mix(light_on(light, n, c), seen, finish.metalness);
-  const double all =
-      finish.colour * factor(body) + factor(albedo * body + seen * part) - factor(albedo * body);
+  const double sum = linear(finish.colour * factor(body)) + seen * part;
+  const double all = 1.055 * std::pow(sum, 1 / 2.4) - 0.055;
   return static_cast<std::uint8_t>(std::lround(255 * std::clamp(all, 0.0, 1.0)));
 }
 

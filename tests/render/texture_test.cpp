@@ -200,6 +200,30 @@ TEST_F(TextureTest, EachMipLevelIsTheOneOfItsSize) {
   }
 }
 
+TEST_F(TextureTest, LightIsAddedToEachTexelsOwn) {
+  std::vector<HandMadeBlock> blocks;
+  for (int gray = 0; gray < 16; ++gray) blocks.push_back(flat_block(gray, gray, gray));
+  SceneMaker maker;
+  add_square(maker, maker.add_texture(16, {pack_all(blocks)}, {}, 0));
+  constexpr float kGlow = 0.3f;
+  std::fill_n(maker.content.materials.back().emission, 3, kGlow);
+  const MappedBundle bundle(maker.content);
+  const std::unique_ptr<Renderer> renderer = make_renderer(*bundle.view, probe_gl_caps());
+  ASSERT_TRUE(renderer);
+  const ExactView view = exact_view(16);
+  const std::vector<std::uint8_t> pixels = draw(*renderer, view.camera, {&view.item, 1});
+  const auto linear = [](double c) {
+    return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+  };
+  for (int gray = 0; gray < 16; ++gray) {
+    const int x = gray % 4 * 4 + 1;
+    const int y = gray / 4 * 4 + 1;
+    const double sum = linear(std::min(gray * 17 + 2, 255) / 255.0) + linear(double{kGlow});
+    const double stored = std::min(1.055 * std::pow(sum, 1 / 2.4) - 0.055, 1.0);
+    EXPECT_NEAR(pixels[static_cast<std::size_t>(4 * (16 * y + x))], 255 * stored, 4) << gray;
+  }
+}
+
 TEST_F(TextureTest, LevelsBeyondTheLimitAreLeftOut) {
   std::vector<std::vector<std::byte>> levels;
   for (int level = 0; level < 7; ++level) {
