@@ -91,6 +91,8 @@ class Report(ProgramTest):
         for stage in json.loads(done.stdout)["stages"]:
             self.assertIn(stage["name"], page.words)
         self.assertEqual(len([i for i in page.all("img") if "difference" in i["alt"]]), 1)
+        faces = sum(line.startswith("f ") for line in POTTERY.read_text().splitlines())
+        self.assertRegex(" ".join(page.words), rf"What became of the files' content.*pottery\s*faces\s*{faces:,}\s*0\s*0")
         (self.folder / "bake.json").write_text("{}")
         self.assert_fails(self.modar("report", bundle, "-o", "x.html", "--bake", "bake.json", "--quiet"), 3, "report.bake")
 

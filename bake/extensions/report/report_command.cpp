@@ -72,7 +72,9 @@ void add_report(CommandLine& program) {
   line.flag("--range", command->options.range,
             "Also simulate each pattern's working range (seconds per pattern)");
   line.option("--bake", &command->bake_file,
-              "Output of `modar bake --json`: adds the time of each stage", {.type = "FILE.json"});
+              "Output of `modar bake --json`: adds each stage's time, and what became of the "
+              "files' content",
+              {.type = "FILE.json"});
   line.option(
       "--texture-pictures", &command->options.texture_pictures,
       "Folder of `modar bake --texture-pictures`: adds each texture's source and difference",

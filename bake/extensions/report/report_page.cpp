@@ -388,7 +388,36 @@ class Page {
     html_ += "</tbody></table></div>\n<p class=\"note\">" +
              print("%.1f CPU seconds in all.", total ? total->number().value_or(0) : 0) +
              "</p>\n</section>\n";
+    account(json.find("account").value_or(Json::array()));
     return {};
+  }
+
+  /// What became of everything that the files name, a row for each model and kind.
+  void account(const Json& models) {
+    if (models.size() == 0) return;
+    section("account", "What became of the files' content");
+    html_ +=
+        "<div class=\"scroll\"><table class=\"figures\"><thead><tr><th scope=\"col\">Model</th><th "
+        "scope=\"col\">Of its</th><th scope=\"col\">Used</th><th scope=\"col\">Changed</th><th "
+        "scope=\"col\">Left out</th></tr></thead><tbody>\n";
+    for (std::size_t m = 0; m < models.size(); ++m) {
+      const Json model = *models.at(m);
+      const std::string title = model.find("model").value_or("").text().value_or("");
+      for (const char* kind : {"images", "colours", "faces", "nodes", "animations", "attributes"}) {
+        std::string cells;
+        double all = 0;
+        for (const char* fate : {"used", "changed", "left_out"}) {
+          const auto found = model.find(std::string(kind) + "/" + fate);
+          const double number = found ? found->number().value_or(0) : 0;
+          cells += "<td>" + grouped(static_cast<std::uint64_t>(number)) + "</td>";
+          all += number;
+        }
+        if (all == 0) continue;
+        html_ += "<tr><th scope=\"row\">" + escape_html(title) + "</th><td>" + kind + "</td>" +
+                 cells + "</tr>\n";
+      }
+    }
+    html_ += "</tbody></table></div>\n</section>\n";
   }
 
   Result<void> patterns() {
