@@ -924,6 +924,36 @@ class Page(ProgramTest):
         self.browser.wait("document.getElementById('start').textContent !== ''", "the plain page")
         self.assertFalse(self.browser.run("Boolean(document.getElementById('survey-open'))"))
 
+    def test_lists_over_the_camera_choose_model_and_picture(self):
+        bundles = [self.folder / f"{name}.modar" for name in ("pots", "pans")]
+        for each in bundles:
+            shutil.copy(self.bundle, each)
+        done = self.modar("web", *bundles, "-o", self.folder / "two", "--languages", "en", "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        server = Server(self.folder / "two")
+        self.addCleanup(server.close)
+        state = "document.getElementById('viewer').state === '%s'"
+        button = "[...document.querySelectorAll('#lists button')].find(({ textContent }) => textContent === '%s')"
+        self.browser.open(server.url)
+        self.browser.wait("document.getElementById('bundle').options.length === 2", "two models")
+        self.browser.run("document.getElementById('start').click()")
+        self.browser.wait(state % "seen", "the first model")
+        self.browser.run("document.getElementById('lists-open').click()")
+        self.browser.wait(f"Boolean({button % 'pots'})", "the lists")
+        self.assertEqual(self.browser.run(f"{button % 'pots'}.ariaPressed + {button % 'pans'}.ariaPressed"), "truefalse")
+        self.keep("lists.png")
+        self.browser.run(f"{button % 'Back'}.click()")  # to the camera's picture
+        self.assertTrue(self.browser.run("!document.getElementById('lists').open && " + state % "seen"))
+        self.browser.run("document.getElementById('lists-open').click()")
+        self.browser.wait(f"document.getElementById('lists').open && Boolean({button % 'pans'})", "the lists again")
+        self.browser.run(f"{button % 'pans'}.click()")
+        self.browser.wait("document.getElementById('bundle').selectedIndex === 1 && " + state % "seen", "the second model")
+        self.browser.run("document.getElementById('lists-open').click()")
+        self.browser.wait(f"document.getElementById('lists').open && {button % 'cover'}?.querySelector('img').complete", "the pictures")
+        self.browser.run(f"{button % 'cover'}.click()")
+        self.browser.wait(state % "around", "the picture's model without a camera")
+        self.browser.run("document.getElementById('viewer').stop()")
+
     def test_a_film_shows_the_model(self):
         self.browser.resize(390, 844, 1, True)
         self.browser.open(self.server.url)

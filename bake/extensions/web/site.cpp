@@ -30,7 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Files copied unchanged; index.html, sw.js and the words are written with changes.
-constexpr std::array<std::string_view, 28> kPageFiles = {"app.js",
+constexpr std::array<std::string_view, 29> kPageFiles = {"app.js",
                                                          "download.js",
                                                          "engine-plain.js",
                                                          "engine-plain.wasm",
@@ -45,6 +45,7 @@ constexpr std::array<std::string_view, 28> kPageFiles = {"app.js",
                                                          "icon-512.png",
                                                          "icon.svg",
                                                          "installed-release.js",
+                                                         "lists.js",
                                                          "media.js",
                                                          "modar-worker-plain.js",
                                                          "modar-worker-simd.js",

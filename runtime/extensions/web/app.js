@@ -175,7 +175,7 @@ async function chooseBundles() {
   site.own ??= site.bundles;
   site.bundles = installed ?? site.own;
   $('bundle').replaceChildren(...site.bundles.map(({title}, i) => new Option(title, `${i}`)));
-  $('choice').hidden = site.bundles.length < 2;
+  $('choice').hidden = $('lists-open').hidden = site.bundles.length < 2;
 }
 
 const canKeep = () => !forgotten && 'serviceWorker' in navigator && globalThis.isSecureContext;
@@ -227,6 +227,34 @@ async function loadBundle(again = false) {
   }
 }
 
+/** Lists of models and pictures, over the camera's picture. */
+async function openLists() {
+  const {patterns, installed} = currentBundle();
+  const lists = await import('./lists.js');
+  lists.openLists(
+      {
+        words,
+        titles: site.bundles.map(({title}) => title),
+        chosen: $('bundle').selectedIndex,
+        pictures: patterns.map(({title, image}) => ({title, image: addressOf(image, installed)})),
+        choose(bundle) {
+          viewer.stop();
+          $('bundle').selectedIndex = bundle;
+          showPlates();
+          press('start', () => viewer.start(loadBundle()));
+        },
+        look(pattern) {
+          viewer.stop();
+          press('look', () => viewer.look(pattern, loadBundle()));
+        },
+        own() {
+          viewer.stop();
+          $('own-file').click();
+        }
+      },
+      adopt);
+}
+
 /** Newer bundles of a release folder are downloaded meanwhile; the next visit shows it. */
 function update() {
   if (!site.release || !navigator.onLine || !('caches' in globalThis)) return;
@@ -262,8 +290,8 @@ async function prepare() {
     loading = loadBundle().catch(() => {});  // the start button names the fault
   if (new URLSearchParams(location.search).has('survey')) {
     const {Survey} = await import('./survey.js');
-    survey = new Survey(
-        {viewer, foot: $('foot'), title: site.title, adopt, fetchJson, store, stored});
+    survey =
+        new Survey({viewer, foot: $('foot'), title: site.title, adopt, fetchJson, store, stored});
   }
   await useLanguage(chooseLanguage(site.languages));
   showLanguages();
@@ -427,6 +455,7 @@ function listen() {
     start: () => press('start', () => viewer.start(loadBundle())),
     look: () => press('look', () => viewer.look(0, loadBundle())),
     about: () => $('notes').showModal(),
+    'lists-open': openLists,
     'notes-close': () => $('notes').close(),
     forget,
     shoot,

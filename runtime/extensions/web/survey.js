@@ -66,9 +66,7 @@ export class VisitLog {
   #since = new Map();
 
   /** @param {object} head */
-  constructor(head) {
-    this.#lines.push({qos: {version: 1, ...head, budget_ms: BUDGET_MS}});
-  }
+  constructor(head) { this.#lines.push({qos: {version: 1, ...head, budget_ms: BUDGET_MS}}); }
 
   /**
    * @param {'found' | 'lost'} event
@@ -178,10 +176,10 @@ export class Survey {
     form.append(
         make('h2', {id: 'survey-title', textContent: open}), make('p', {textContent: how}),
         ...statements.map((text, i) => this.#scale(text, i)),
-        ...questions.map((text, i) => make(
-                             'p', {},
-                             make('label', {htmlFor: `answer-${i}`, textContent: text}),
-                             make('textarea', {id: `answer-${i}`, name: `a${i}`, rows: 2}))),
+        ...questions.map(
+            (text, i) => make(
+                'p', {}, make('label', {htmlFor: `answer-${i}`, textContent: text}),
+                make('textarea', {id: `answer-${i}`, name: `a${i}`, rows: 2}))),
         make('output', {id: 'survey-kept', className: 'small'}),
         make(
             'p', {className: 'row'}, done,
@@ -213,11 +211,13 @@ export class Survey {
     if (!kept) return;
     kept.sus.forEach((value, i) => {
       const step = form.querySelector(`[name=s${i}][value="${value}"]`);
-      if (step) /** @type {HTMLInputElement} */ (step).checked = true;
+      if (step) /** @type {HTMLInputElement} */
+        (step).checked = true;
     });
     kept.answers.forEach((text, i) => {
       const field = form.querySelector(`[name=a${i}]`);
-      if (field) /** @type {HTMLTextAreaElement} */ (field).value = text;
+      if (field) /** @type {HTMLTextAreaElement} */
+        (field).value = text;
     });
   }
 
