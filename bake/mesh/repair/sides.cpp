@@ -89,6 +89,7 @@ std::vector<bool> seen_backs(const Faces& surface, const Components& components,
     }
   }
   std::vector<bool> seen;
+  seen.reserve(sides.size());
   for (const Sides& own : sides) {
     seen.push_back(own.open > kBacksShare * own.area ||
                    own.volume < -kHollow * own.area * std::sqrt(own.area));
