@@ -381,7 +381,7 @@ TEST(Sides, BacksOfOpenAndInsideOutSurfacesAreSeen) {
     return seen.size() == 1 && seen[0];
   };
   EXPECT_TRUE(backs(bowl())) << "people look into it";
-  EXPECT_TRUE(backs(turned(bowl()))) << "its walls are seen from beside it";
+  EXPECT_TRUE(backs(turned(bowl()))) << "its walls are seen from the side";
   EXPECT_FALSE(backs(turned(bowl(0.1)))) << "a valley";
   EXPECT_FALSE(backs(turned(bowl(-1)))) << "a dome on the ground";
   EXPECT_TRUE(backs(turned(bowl(-1)), {0, 0, -1})) << "a dome from below";
