@@ -18,7 +18,7 @@ constexpr double kBacksShare = 0.02;
 /// Volume by area to the power of 1.5 below which a surface has no inside; a sphere has 0.094.
 constexpr double kHollow = 1e-4;
 
-/// The same below which a surface whose rim hides its backs shows them at its sides, as a basin does.
+/// The same below which a surface with a hiding rim shows its backs at its sides, as a basin does.
 constexpr double kDeep = 0.05;
 
 /// Of a material or a part.
