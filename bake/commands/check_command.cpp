@@ -63,9 +63,10 @@ void print_looks(const std::vector<ModelLook>& looks) {
                 look.delta_e_worst, look.picture.c_str());
     for (const LevelLook& level : look.levels) {
       std::printf(
-          "  level %u, from %.0f pixels down: differs by %.1f of 255 (99 %% of its pixels), "
-          "%" PRIu64 " of %" PRIu64 " triangles\n",
-          level.level, level.side_px, level.difference, level.triangles, level.finest_triangles);
+          "  level %u, from %.0f pixels down: differs by %.1f of 255 in the mean (%.1f at most in "
+          "99 %% of its pixels), %" PRIu64 " of %" PRIu64 " triangles\n",
+          level.level, level.side_px, level.difference_mean, level.difference, level.triangles,
+          level.finest_triangles);
     }
   }
 }

@@ -75,7 +75,8 @@ Json levels_json(const std::vector<LevelLook>& levels) {
             {"side_px", level.side_px},
             {"triangles", level.triangles},
             {"finest_triangles", level.finest_triangles},
-            {"difference_p99", level.difference}};
+            {"difference_p99", level.difference},
+            {"difference_mean", level.difference_mean}};
   });
 }
 

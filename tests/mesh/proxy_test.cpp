@@ -29,10 +29,10 @@ struct Made {
 };
 
 /// measured: see LevelOptions.
-Made made(const std::string& obj, std::uint32_t max_vertices,
-          PositionKind kind = PositionKind::kFloat, std::size_t measured = kMeasuredTriangles) {
+Made made(TriMesh mesh, std::uint32_t max_vertices, PositionKind kind = PositionKind::kFloat,
+          std::size_t measured = kMeasuredTriangles) {
   Made out;
-  out.mesh = chunked(welded(parse(obj)), max_vertices);
+  out.mesh = chunked(std::move(mesh), max_vertices);
   LevelOptions options;
   options.levels = kMaxLevels;
   options.positions = kind;
@@ -49,6 +49,11 @@ Made made(const std::string& obj, std::uint32_t max_vertices,
   EXPECT_TRUE(all);
   if (all) out.proxies = std::move(*all);
   return out;
+}
+
+Made made(const std::string& obj, std::uint32_t max_vertices,
+          PositionKind kind = PositionKind::kFloat, std::size_t measured = kMeasuredTriangles) {
+  return made(welded(parse(obj)), max_vertices, kind, measured);
 }
 
 using Triangles = std::vector<TriangleTree::Triangle>;
@@ -124,7 +129,7 @@ TEST(Proxies, HalveDownToAThousandInOneChunkWithinTheirBounds) {
       const double off = std::max(sampled_distance(fine, coarse), sampled_distance(coarse, fine));
       EXPECT_LE(off, proxy.error);
       // The waves are a twentieth of the sheet high.
-      EXPECT_LT(proxy.error, measured > 0 ? 0.02 : std::max(0.02, 0.5 * proxy.shading));
+      EXPECT_LT(proxy.error, measured > 0 ? 0.02 : std::max(0.02, 1.01 * proxy.shading));
     }
   }
 }
@@ -163,6 +168,36 @@ TEST(Proxies, CarryThePictureAndTheRim) {
   EXPECT_LT(std::max(low.x, low.y), 0.01);
   EXPECT_GT(std::min(high.x, high.y), 0.99);
   for (const glm::vec3& normal : mesh.normals) EXPECT_NEAR(glm::length(normal), 1.0f, 1e-4f);
+}
+
+TEST(Proxies, BlendToTheNormalsAndColoursOfLevelZero) {
+  TriMesh mesh = welded(parse(grid(100, 1)));
+  const std::size_t count = mesh.positions.size();
+  mesh.colours = Array<glm::u8vec4>(count, glm::u8vec4(50, 50, 50, 255));
+  std::mt19937 random(5);
+  double tilts = 0;
+  for (std::size_t v = 0; v < count; ++v) {
+    const double tilt = 0.6 * static_cast<double>(random()) / 4294967296.0 - 0.3;
+    mesh.normals[v] = glm::normalize(glm::vec3(static_cast<float>(tilt), 0, 1));
+    if (random() % 2 == 0) mesh.colours[v] = glm::u8vec4(200, 200, 200, 255);
+    tilts += tilt * tilt;
+  }
+  const Made sheet = made(std::move(mesh), 65535);
+  ASSERT_FALSE(sheet.proxies.empty());
+  const TriMesh& proxy = sheet.proxies.front().mesh.mesh;
+  double left = 0;
+  double greys = 0;
+  double sum = 0;
+  for (std::size_t v = 0; v < proxy.positions.size(); ++v) {
+    left += std::pow(static_cast<double>(proxy.normals[v].x), 2);
+    greys += std::pow(proxy.colours[v].r - 125.0, 2);
+    sum += proxy.colours[v].r - 125.0;
+  }
+  const auto vertices = static_cast<double>(proxy.positions.size());
+  // Vertices that are picked would have all of it, those that are averaged of eight a third.
+  EXPECT_LT(std::sqrt(left / vertices), 0.6 * std::sqrt(tilts / static_cast<double>(count)));
+  EXPECT_LT(std::sqrt(greys / vertices), 0.6 * 75);
+  EXPECT_NEAR(sum / vertices, 0, 5);
 }
 
 /// Collapses of chunks leave vertices where they were, on one side of the surface: those that are
@@ -255,6 +290,11 @@ TEST(Proxies, ArePlannedByTrianglesAndLevels) {
   using Halvings = std::vector<std::uint32_t>;
   EXPECT_EQ(planned(60), Halvings());  // an eighth of 7200 are 900
   EXPECT_EQ(planned(100), (Halvings{3, 4}));
+  // A phone draws 98,000 triangles of one model, and no more than a third less.
+  EXPECT_EQ(level_triangles(392'000, 2), 98'000u);
+  EXPECT_EQ(level_triangles(871'280, 3), 98'000u);
+  EXPECT_EQ(level_triangles(560'000, 2), 140'000u);
+  EXPECT_EQ(level_triangles(280'000, 2), 70'000u);
   // A quarter of 10,000, and the least of 80,000 halved that is above 1000.
   EXPECT_EQ(planned(200), (Halvings{3, 5, 6}));
   options.levels = 4;

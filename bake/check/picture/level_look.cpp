@@ -95,6 +95,16 @@ class Differences {
     }
   }
 
+  [[nodiscard]] double mean() const {
+    double sum = 0;
+    double all = 0;
+    for (std::size_t i = 0; i < counts_.size(); ++i) {
+      sum += static_cast<double>(i * counts_[i]) / kSteps;
+      all += static_cast<double>(counts_[i]);
+    }
+    return all > 0 ? sum / all : 0.0;
+  }
+
   [[nodiscard]] double percentile(double share) const {
     std::uint64_t all = 0;
     for (const std::uint64_t count : counts_) all += count;
@@ -163,6 +173,7 @@ class LevelLooker {
     }
     look.triangles /= kViews;
     look.finest_triangles /= kViews;
+    look.difference_mean = differences.mean();
     look.difference = differences.percentile(0.99);
     return look;
   }

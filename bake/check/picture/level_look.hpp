@@ -33,6 +33,7 @@ struct LevelLook {
   /// samples a pixel is not counted as a difference: of a scan of 0.85 million triangles, 11 pixels
   /// wide, 5.5 of 255 with 16 samples a pixel, 1.1 with 2,000 and with 8,000.
   double difference = 0;
+  double difference_mean = 0;  ///< the same, in the mean
 };
 
 struct LevelLookOptions {

@@ -17,6 +17,7 @@
 #include "bake/extensions/lab/lod_bench.hpp"
 #include "bake/extensions/lab/render_bench.hpp"
 #include "bake/extensions/lab/ship_bench.hpp"
+#include "bake/extensions/lab/views_bench.hpp"
 #include "bake/extensions/lab/wild_bench.hpp"
 #include "bake/io/terminal.hpp"
 #include "formats/base/path.hpp"
@@ -237,6 +238,9 @@ const std::vector<Bench>& benches() {
        [](const BenchOptions& command) { return bench_model_rows(command.inputs, command.model); }},
       {"lod", true, "MODEL...", "levels of detail, next to meshopt_simplify on the whole mesh",
        [](const BenchOptions& command) { return bench_lod(command.inputs, command.model.jobs); }},
+      {"views", true, "FINEST OURS REFERENCE",
+       "pictures of a bundle's levels next to another bundle of as many triangles",
+       [](const BenchOptions& command) { return bench_views(command.inputs); }},
       {"pose", false, "--patterns DIR --backgrounds DIR [--video FILE [--truth CSV]]",
        "the pose loop next to the ModAR paper's method, on the same frames",
        [](const BenchOptions& command) { return bench_pose_rows(command.pose); }},

@@ -14,7 +14,7 @@ namespace modar {
 
 /// Share of the shading's error below which distances of large models need no exact measure. Higher
 /// bakes faster and states the distance less exactly. [0.25, 1]
-inline constexpr double kHidden = 0.5;
+inline constexpr double kHidden = 1;
 
 /// Which parts of two levels are near each other, as far as the way of each vertex tells.
 struct CollapseBound {

@@ -46,11 +46,17 @@ constexpr double kLeastShare = 0.75;
 /// Share of the next level's error above which a level is left out. Lower stores fewer levels,
 /// higher stores levels that are rarely drawn.
 constexpr double kAlike = 0.9;
+/// Share of the chunk's diagonal up to which distances need no exact measure. Higher bakes faster
+/// and uses proxies of noisy chunks less. [0.01, 0.05]
+constexpr double kLoosest = 0.03;
 /// Where collapses leave more than one in this many triangles open, a map of the whole is faster.
 constexpr std::size_t kMostOpen = 8;
 /// Normals at one place that a corner chooses from: bounds the time where more are. Any number that
 /// models do not reach.
 constexpr int kMostNormals = 256;
+/// What a phone without ES 3 draws of one model in a frame, less some draw calls (see the
+/// renderer's kFewTriangles).
+constexpr std::size_t kPhoneTriangles = 98'000;
 constexpr std::size_t kChunksPerUpdate = 8;  ///< chunks between two updates of the progress bar
 
 /// Vertices that differ in their normals only, as one: flat-shaded models have one for every corner
@@ -333,7 +339,7 @@ std::vector<Cut> cuts_for(const ChunkedMesh& mesh, const std::vector<CollapseSeq
                           const std::vector<std::uint32_t>& halvings) {
   std::vector<Cut> cuts;
   for (const std::uint32_t level : halvings) {
-    std::optional<Cut> cut = cut_for(mesh, sequences, triangles_in(mesh) >> level);
+    std::optional<Cut> cut = cut_for(mesh, sequences, level_triangles(triangles_in(mesh), level));
     const bool reached = cut.has_value();
     const float before = cuts.empty() ? 0.0f : cuts.back().price;
     if (!reached) cut = {std::max(before, kLeastPrice) * kMaxErrorRatio * kMaxErrorRatio, 1.0};
@@ -458,10 +464,9 @@ void measure(MeasuredLevel& level, std::vector<MeasuredLevel>& finer,
   if (bound.open.empty()) {
     level.error = std::max(least, bound.moved);
   } else if (bound.open.size() * kMostOpen < finest.triangles()) {
-    level.error =
-        distance_of_open(level, finest, become, nearby, bound, std::max(least, bound.moved));
+    level.error = distance_of_open(level, finest, become, nearby, bound, enough);
   } else {
-    const auto exact = [&](MeasuredLevel& other) { return other.error <= kNegligible * least; };
+    const auto exact = [&](MeasuredLevel& other) { return other.error <= kNegligible * enough; };
     MeasuredLevel& from = *std::find_if(finer.rbegin(), finer.rend(), exact);
     const double distance = level_distance(from.surface(), level.surface(), nearby,
                                            from.of_vertices(), enough - from.error);
@@ -596,6 +601,7 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged,
   const std::span<const std::uint16_t> finest = merged.indices_of(chunk);
   const double side = texels.empty() ? 0.0 : options.texture_sides[chunk.material];
   ChunkLooker looker(mesh, chunk, merged, positions, side * limits.length_of_uv);
+  const double loosest = kLoosest * diagonal_of(positions);
   std::vector<MeasuredLevel> levels;
   levels.emplace_back(positions, std::vector<std::uint16_t>(finest.begin(), finest.end()));
   for (const Cut& cut : cuts) {
@@ -616,7 +622,7 @@ void level_chunk(const TriMesh& mesh, const MergedVertices& merged,
     level.indices = coarser.indices;
     split_normals(mesh, chunk, merged, positions, level.indices);
     level.shading = looker.shading(coarser, level.indices, become, nearby);
-    measure(coarser, levels, positions, become, nearby, hidden * level.shading);
+    measure(coarser, levels, positions, become, nearby, std::min(hidden * level.shading, loosest));
     level.error = coarser.error;
     levels.push_back(std::move(coarser));
   }
@@ -637,7 +643,8 @@ ProxyStart start_of(const TriMesh& mesh, const Chunk& chunk, const MergedVertice
   split_normals(mesh, chunk, merged, positions, start.indices);
   std::vector<std::uint16_t> numbers(positions.size());
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
-    if (of(static_cast<std::uint16_t>(v)) != v) continue;
+    start.become.push_back(of(static_cast<std::uint16_t>(v)));
+    if (start.become.back() != v) continue;
     numbers[v] = static_cast<std::uint16_t>(start.vertices.size());
     start.vertices.push_back(static_cast<std::uint16_t>(v));
   }
@@ -662,6 +669,11 @@ std::size_t triangles_in(const ChunkedMesh& mesh) {
   std::size_t count = 0;
   for (const Chunk& chunk : mesh.chunks) count += chunk.indices.size() / 3;
   return count;
+}
+
+std::size_t level_triangles(std::size_t triangles, std::uint32_t halvings) {
+  const std::size_t level = triangles >> halvings;
+  return level > kPhoneTriangles && level < kPhoneTriangles * 10 / 7 ? kPhoneTriangles : level;
 }
 
 std::vector<std::uint32_t> halvings_of(std::size_t triangles, const LevelOptions& options) {

@@ -42,12 +42,17 @@ inline constexpr std::uint32_t kMaxLevels = 12;
 struct ProxyStart {
   std::vector<std::uint16_t> indices;   ///< what each corner of that level has become
   std::vector<std::uint16_t> vertices;  ///< that are left, of those that differ in normals one
+  std::vector<std::uint16_t> become;    ///< of each vertex: one of these
   std::vector<Quadric>
       quadrics;  ///< of each of these: of the triangles of level 0 that it represents
 };
 
 /// Triangles of level 0.
 std::size_t triangles_in(const ChunkedMesh& mesh);
+
+/// Triangles of a level of a model of that size: as often halved, or what a phone without ES 3
+/// draws where that is at most 30 % less.
+std::size_t level_triangles(std::size_t triangles, std::uint32_t halvings);
 
 /// How often the triangles of a model of that size are halved at each coarser level.
 std::vector<std::uint32_t> halvings_of(std::size_t triangles, const LevelOptions& options);
@@ -103,7 +108,7 @@ struct ProxyOptions {
 /// Makes the proxies of a mesh whose chunks have their levels, the finest first, from where they
 /// begin in each chunk. Borders of chunks mean nothing to them, those of materials and uv islands
 /// are kept as long as anything else costs less. Fewer than planned where a mesh is in too many
-/// pieces. Vertices carry the normals, uvs, colours and occlusion of level 0.
+/// pieces. Vertices carry uvs of level 0, and normals, colours and occlusion that blend to its own.
 Result<std::vector<Proxy>> make_proxies(const ChunkedMesh& mesh,
                                         const std::vector<ProxyStart>& starts,
                                         const ProxyOptions& options, Report& report);

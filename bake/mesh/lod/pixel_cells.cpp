@@ -12,9 +12,12 @@
 namespace modar {
 namespace {
 
-/// Steps of a colour that a picture changes by for a radian of a normal. Higher draws coarse levels
-/// later. [120, 160]
-constexpr float kNormalGain = 140;
+/// Steps of a colour that a picture changes by for a radian of a normal, in the mean. Higher draws
+/// coarse levels later. [50, 70]
+constexpr float kNormalGain = 54;
+/// Share of a colour's change that is seen in the light of a room. Higher draws coarse levels
+/// later.
+constexpr float kColourGain = 0.5f;
 /// Steps of an 8-bit colour for one of 127 steps of ambient light. Lower draws levels too early on
 /// shaded models.
 constexpr float kOcclusionGain = 1;
@@ -23,9 +26,13 @@ constexpr float kOcclusionGain = 1;
 constexpr float kSlideGain = 100;
 /// Bytes, however far a texture slides: across a seam, it tells nothing.
 constexpr float kMostSlide = 60;
-/// Bytes that nobody sees, and the share of the area that may differ by more.
-constexpr float kSame = 2;
+/// Mean difference of 255 that nobody sees. Higher draws coarse levels larger.
+constexpr double kSame = 1.5;
+/// Share of the area that may differ by more where a picture shows a part of it only.
 constexpr double kShare = 0.01;
+/// Pixels along the box of which pictures show all: the mean tells nothing of larger ones. Higher
+/// draws coarse levels larger.
+constexpr double kShownWhole = 400;
 /// Halvings of the box to the smallest cell: a chunk has at most 65,535 vertices, some 256 along a
 /// side.
 constexpr unsigned kBits = 10;
@@ -41,7 +48,7 @@ std::uint32_t spread(std::uint32_t x) {
 /// Of 255. sum: over a cell. side: of the pixel.
 float shown(const LookDifference& sum, float side) {
   const glm::vec3 c = glm::abs(sum.colour);
-  return (kNormalGain * glm::length(sum.normal) + std::max({c.x, c.y, c.z}) +
+  return (kNormalGain * glm::length(sum.normal) + kColourGain * std::max({c.x, c.y, c.z}) +
           std::min(kSlideGain * glm::length(sum.slide) / side, kMostSlide * sum.area)) /
          sum.area;
 }
@@ -83,16 +90,18 @@ PixelCells::PixelCells(std::span<const glm::dvec3> points) {
   });
 }
 
-double PixelCells::share_above(unsigned bits) const {
+PixelCells::Shown PixelCells::shown_in(unsigned bits) const {
   const auto side = static_cast<float>(std::ldexp(side_, -static_cast<int>(bits)));
   const unsigned shift = 3 * (kBits - bits);
   double all = 0;
-  double above = 0;
+  Shown found;
   LookDifference cell;
   const auto close = [&] {
     if (cell.area > 0) {
       all += static_cast<double>(cell.area);
-      if (!(shown(cell, side) < kSame)) above += static_cast<double>(cell.area);
+      const auto here = static_cast<double>(shown(cell, side));
+      found.mean += static_cast<double>(cell.area) * here;
+      if (here > kSame) found.share += static_cast<double>(cell.area);
     }
     cell = {};
   };
@@ -102,7 +111,7 @@ double PixelCells::share_above(unsigned bits) const {
     cell += d;
   }
   close();
-  return all > 0 ? above / all : 0.0;
+  return all > 0 ? Shown{found.mean / all, found.share / all} : Shown();
 }
 
 /// Of 255, where the whole box is a pixel. A pixel that is larger shows as much less as the box is
@@ -122,25 +131,26 @@ double PixelCells::smallest_pixel(std::span<const LookDifference> differences) {
     d.colour *= d.area;
     d.slide *= d.area;
   }
-  const double finest = share_above(kBits);
-  if (finest <= kShare) return 0;
+  const Shown finest = shown_in(kBits);
+  const double least = finest.share > kShare ? side_ / kShownWhole : 0.0;
+  if (finest.mean <= kSame) return least;
   // What differs in the finest averages out in larger ones, and is passed on.
-  double finer = finest;
-  double share = share_above(bits_);
-  for (; share <= kShare; ++bits_) {
-    finer = bits_ + 1 == kBits ? finest : share_above(bits_ + 1);
-    if (finer > kShare) break;
-    share = finer;
+  double finer = finest.mean;
+  double mean = shown_in(bits_).mean;
+  for (; mean <= kSame; ++bits_) {
+    finer = bits_ + 1 == kBits ? finest.mean : shown_in(bits_ + 1).mean;
+    if (finer > kSame) break;
+    mean = finer;
   }
-  for (; share > kShare && bits_ > 0; --bits_) {
-    finer = share;
-    share = share_above(bits_ - 1);
+  for (; mean > kSame && bits_ > 0; --bits_) {
+    finer = mean;
+    mean = shown_in(bits_ - 1).mean;
   }
   const double side = std::ldexp(side_, -static_cast<int>(bits_));
-  if (share > kShare) return 2 * side * std::sqrt(shown_at_once() / double{kSame});
+  if (mean > kSame) return 2 * side * std::sqrt(shown_at_once() / kSame);
   // Between the two sides, as a power law.
-  const double most = std::log(finer / std::max(share, kShare / 16));
-  return side * std::exp2(-1 + std::log(finer / kShare) / most);
+  const double most = std::log(finer / std::max(mean, kSame / 16));
+  return std::max(least, side * std::exp2(-1 + std::log(finer / kSame) / most));
 }
 
 }  // namespace modar

@@ -52,14 +52,19 @@ class PixelCells {
  public:
   explicit PixelCells(std::span<const glm::dvec3> points);
 
-  /// Side of the smallest pixel, in the points' unit, over which differences average out: but for 1
-  /// % of the area, all pixels of a picture differ by less than 2 of 255. 0: any pixel will do.
-  /// Larger than the points' box where even that differs by more, the more the larger.
-  /// differences: one a point.
+  /// Side of the smallest pixel, in the points' unit, over which differences average out: pixels of
+  /// a picture of all of them differ by less than 1.5 of 255 in the mean. 0: any pixel will do, as
+  /// 99 % of the area differ by less. Larger than the points' box where even that differs by more,
+  /// the more the larger. differences: one a point.
   [[nodiscard]] double smallest_pixel(std::span<const LookDifference> differences);
 
  private:
-  [[nodiscard]] double share_above(unsigned bits) const;
+  /// What pixels show that are the box halved so often.
+  struct Shown {
+    double mean = 0;   ///< of 255
+    double share = 0;  ///< of the area, that shows more than is seen
+  };
+  [[nodiscard]] Shown shown_in(unsigned bits) const;
   [[nodiscard]] double shown_at_once() const;
 
   struct Place {

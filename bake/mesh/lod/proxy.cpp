@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "bake/mesh/lod/attribute_fit.hpp"
 #include "bake/mesh/lod/collapse_bound.hpp"
 #include "bake/mesh/lod/mesh_collapse.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
@@ -20,7 +21,7 @@ namespace modar {
 namespace {
 
 /// No phone draws more triangles of one model, and the inside is drawn by chunks.
-constexpr std::size_t kMostProxy = 300'000;
+constexpr std::size_t kMostProxy = 140'000;
 /// A model of fewer is drawn unchanged.
 constexpr std::size_t kLeastProxy = 1000;
 /// Halvings of the first: chunks have the levels before. Their vertices are those of level 0 and
@@ -38,6 +39,12 @@ constexpr double kRepriced = 0.7;
 /// At most this many triangles are compared for the shading: a share of 1 % of them is known to
 /// 0.05 %.
 constexpr std::size_t kMostLooks = 50'000;
+/// Points of the finest level for each triangle of a proxy that its attributes are fitted to.
+/// Higher is more exact and slower. [2, 8]
+constexpr std::size_t kFitted = 4;
+/// Cosine of the angle between the normals of level 0 and a proxy beyond which a point is on
+/// another side of an edge.
+constexpr double kSameSide = 0.5;
 
 /// A surface of the whole model that others are measured against. Moves, but is never copied, as
 /// `triangles` looks at the others.
@@ -59,9 +66,9 @@ struct JoinedSurface {
   std::vector<std::uint32_t> vertices;   ///< of the mesh, by vertex of the surface
   std::vector<std::uint32_t> start;      ///< by index of the surface: the vertex it has become
   std::vector<Quadric> quadrics;         ///< by vertex of the surface
+  Array<std::uint32_t> become;           ///< by vertex of the mesh: that of the surface
   std::vector<std::uint32_t> materials;  ///< by triangle
   std::vector<std::uint32_t> faces;      ///< by triangle: of the collapser, kNoIndex: none
-  double shading = 0;
 };
 
 JoinedSurface join_chunks(const ChunkedMesh& mesh, const std::vector<ProxyStart>& starts,
@@ -69,6 +76,7 @@ JoinedSurface join_chunks(const ChunkedMesh& mesh, const std::vector<ProxyStart>
   JoinedSurface joined;
   const std::vector<ChunkGrid> grids = make_grids(mesh, kind);
   Array<std::uint32_t> numbers(mesh.mesh.positions.size(), kNoIndex);
+  joined.become = Array<std::uint32_t>(numbers.size(), kNoIndex);
   Measured& surface = joined.surface;
   for (std::size_t c = 0; c < mesh.chunks.size(); ++c) {
     const Chunk& chunk = mesh.chunks[c];
@@ -85,7 +93,6 @@ JoinedSurface join_chunks(const ChunkedMesh& mesh, const std::vector<ProxyStart>
     };
     if (!chunk.coarser.empty()) {
       surface.error = std::max(surface.error, chunk.coarser.back().error);
-      joined.shading = std::max(joined.shading, chunk.coarser.back().shading);
     }
     const ProxyStart& start = starts[c];
     for (const std::uint16_t i :
@@ -95,6 +102,9 @@ JoinedSurface join_chunks(const ChunkedMesh& mesh, const std::vector<ProxyStart>
     for (const std::uint16_t i : start.indices) joined.start.push_back(number_of(i));
     for (std::size_t i = 0; i < start.vertices.size(); ++i) {
       joined.quadrics[number_of(start.vertices[i])] += start.quadrics[i];
+    }
+    for (std::size_t i = 0; i < start.become.size(); ++i) {
+      joined.become[chunk.vertices[i]] = number_of(start.become[i]);
     }
     joined.materials.resize(surface.indices.size() / 3, chunk.material);
   }
@@ -227,10 +237,26 @@ std::uint8_t byte_of(float value, float most) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0f, most)));
 }
 
-/// The remaining triangles as a separate mesh. places: of each vertex. low, high: the box of the
-/// whole, which least points of quadrics may leave.
+glm::vec4 shade_of(const TriMesh& mesh, std::uint32_t v) {
+  const float occlusion = mesh.occlusion.empty() ? 0.0f : static_cast<float>(mesh.occlusion[v]);
+  return {mesh.normals.empty() ? glm::vec3(0.0f) : mesh.normals[v], occlusion};
+}
+
+glm::vec4 colour_of(const TriMesh& mesh, std::uint32_t v) {
+  return mesh.colours.empty() ? glm::vec4(0.0f) : glm::vec4(mesh.colours[v]);
+}
+
+/// What vertices of a proxy are of the collapser.
+struct ProxyVertices {
+  std::vector<std::uint32_t> places;
+  std::vector<std::uint32_t> looks;
+  std::vector<std::uint32_t> shades;
+};
+
+/// The remaining triangles as a separate mesh. low, high: the box of the whole, which least points
+/// of quadrics may leave.
 TriMesh mesh_of(const TriMesh& source, const MeshCollapser& collapser, const glm::dvec3& low,
-                const glm::dvec3& high, std::vector<std::uint32_t>& places) {
+                const glm::dvec3& high, ProxyVertices& of) {
   TriMesh mesh;
   mesh.name = source.name;
   mesh.placement = source.placement;
@@ -244,7 +270,9 @@ TriMesh mesh_of(const TriMesh& source, const MeshCollapser& collapser, const glm
       const auto [number, added] = vertices.of({face.looks[k], face.shades[k]});
       triangle[k] = number;
       if (!added) continue;
-      places.push_back(face.places[k]);
+      of.places.push_back(face.places[k]);
+      of.looks.push_back(face.looks[k]);
+      of.shades.push_back(face.shades[k]);
       mesh.positions.push_back(glm::clamp(collapser.point_of(face.places[k]), low, high));
       const CornerLook& look = collapser.look(face.looks[k]);
       const CornerShade& shade = collapser.shade(face.shades[k]);
@@ -338,29 +366,33 @@ std::vector<double> lengths_of_uv(const JoinedSurface& joined, const TriMesh& me
   return lengths;
 }
 
-/// Points of the joined levels where proxies are looked at.
+/// Points of level 0 where proxies are looked at.
 struct LookPoints {
-  std::vector<std::uint32_t> triangles;  ///< of the joined levels
-  std::vector<glm::dvec3> middles;       ///< of these
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< vertices of the mesh
+  std::vector<std::uint32_t> materials;
+  std::vector<glm::dvec3> middles;
   std::vector<Look> looks;
   std::vector<double> areas;
 };
 
-LookPoints look_points(const JoinedSurface& joined, const TriMesh& mesh) {
+LookPoints look_points(const ChunkedMesh& mesh) {
   LookPoints points;
-  const Measured& surface = joined.surface;
-  const std::size_t triangles = surface.indices.size() / 3;
-  for (std::size_t t = 0; t < triangles; t += 1 + triangles / kMostLooks) {
-    const std::uint32_t* i = &surface.indices[3 * t];
-    const glm::dvec3& a = surface.positions[i[0]];
-    const glm::dvec3& b = surface.positions[i[1]];
-    const glm::dvec3& c = surface.positions[i[2]];
-    points.triangles.push_back(static_cast<std::uint32_t>(t));
-    points.middles.push_back((a + b + c) / 3.0);
-    points.areas.push_back(glm::length(glm::cross(b - a, c - a)));
-    points.looks.push_back(
-        look_at(mesh, {joined.vertices[i[0]], joined.vertices[i[1]], joined.vertices[i[2]]},
-                1.0 / 3, 1.0 / 3));
+  const std::size_t step = 1 + triangles_in(mesh) / kMostLooks;
+  std::size_t next = 0;
+  for (const Chunk& chunk : mesh.chunks) {
+    for (; next < chunk.indices.size() / 3; next += step) {
+      std::array<std::uint32_t, 3> v{};
+      for (std::size_t k = 0; k < 3; ++k) v[k] = chunk.vertices[chunk.indices[3 * next + k]];
+      const glm::dvec3& a = mesh.mesh.positions[v[0]];
+      const glm::dvec3& b = mesh.mesh.positions[v[1]];
+      const glm::dvec3& c = mesh.mesh.positions[v[2]];
+      points.triangles.push_back(v);
+      points.materials.push_back(chunk.material);
+      points.middles.push_back((a + b + c) / 3.0);
+      points.areas.push_back(glm::length(glm::cross(b - a, c - a)));
+      points.looks.push_back(look_at(mesh.mesh, v, 1.0 / 3, 1.0 / 3));
+    }
+    next -= chunk.indices.size() / 3;
   }
   return points;
 }
@@ -392,7 +424,7 @@ class ProxyMaker {
         joined_(join_chunks(mesh, starts, options.positions)),
         collapser_(collapse_mesh(mesh.mesh, joined_)),
         places_(collapser_.places()),
-        points_(look_points(joined_, mesh.mesh)),
+        points_(look_points(mesh)),
         lengths_of_uv_(lengths_of_uv(joined_, mesh.mesh)),
         cells_(points_.middles),
         low_(std::numeric_limits<double>::infinity()),
@@ -415,15 +447,16 @@ class ProxyMaker {
     }
     // Pieces of the same triangles go as a whole, all of them at one price.
     if (!collapser_.reduce_to(triangles) || collapser_.triangles() == 0) return false;
-    std::vector<std::uint32_t> places;
+    ProxyVertices of;
     Report quiet;
-    TriMesh whole = mesh_of(mesh_.mesh, collapser_, low_, high_, places);
+    TriMesh whole = mesh_of(mesh_.mesh, collapser_, low_, high_, of);
     MODAR_ASSIGN(out.mesh, chunk(std::move(whole), {}, quiet));
     // What repeats is a material's.
     out.mesh.repeats = mesh_.repeats;
-    Measured surface = decoded_surface(out.mesh, options_.positions, places);
+    Measured surface = decoded_surface(out.mesh, options_.positions, of.places);
     const TrianglesAt at(surface, collapser_, places_);
-    out.shading = std::max(joined_.shading, shading_of(*surface.triangles, at, out.mesh.mesh));
+    fit(*surface.triangles, at, of, out.mesh);
+    out.shading = shading_of(*surface.triangles, at, out.mesh.mesh);
     surface.error = out.error = error_of(surface, at, out.shading);
     measured_.push_back(std::move(surface));
     collapser_.forget();
@@ -441,7 +474,8 @@ class ProxyMaker {
   double error_of(Measured& surface, const TrianglesAt& at, double shading) {
     const double least = measured_.empty() ? joined_.surface.error : measured_.back().error;
     const double hidden = triangles_in(mesh_) > options_.measured_triangles ? kHidden : 0.0;
-    const double enough = std::max(least, hidden * shading) - joined_.surface.error;
+    const double loose = std::max(least, hidden * shading);
+    const double enough = loose - joined_.surface.error;
     const CollapseBound bound = settled_by_collapses(surface, at, enough);
     if (bound.open.empty()) return std::max(least, joined_.surface.error + bound.moved);
     const auto stays = [this](std::uint32_t t) { return is_left(t); };
@@ -459,11 +493,11 @@ class ProxyMaker {
                  near_triangles(joined_.surface, corners, *surface.triangles, at, settled), settled,
                  0, bound.settled);
     }
-    const auto exact = [&](const Measured& other) { return other.error <= kNegligible * least; };
+    const auto exact = [&](const Measured& other) { return other.error <= kNegligible * loose; };
     const auto from = std::find_if(measured_.rbegin(), measured_.rend(), exact);
     Measured& fine = from != measured_.rend() ? *from : joined_.surface;
     const double distance = distance_both_ways(fine, TrianglesAt(fine, collapser_, places_),
-                                               surface, at, std::max(0.0, least - fine.error));
+                                               surface, at, std::max(0.0, loose - fine.error));
     // No coarser one is measured against those before.
     measured_.erase(measured_.begin(), from.base() - (from != measured_.rend() ? 1 : 0));
     return std::max(least, fine.error + distance);
@@ -492,19 +526,91 @@ class ProxyMaker {
                           std::span<const double>(moved), lands, most);
   }
 
+  /// A triangle of a proxy where a vertex of level 0 has gone; kNoIndex: that piece is gone.
+  [[nodiscard]] std::uint32_t triangle_at(std::uint32_t vertex, const TrianglesAt& at) const {
+    const std::uint32_t become = joined_.become[vertex];
+    const std::uint32_t place = become == kNoIndex ? kNoIndex : joined_.surface.places[become];
+    return place == kNoIndex ? kNoIndex : at[place];
+  }
+
+  /// The middle of a triangle of level 0 on a proxy; nothing where the proxy has no such side.
+  [[nodiscard]] std::optional<FitPoint> fit_point(const std::array<std::uint32_t, 3>& v,
+                                                  const MeshSurface& surface, const TrianglesAt& at,
+                                                  const TriMesh& mesh) const {
+    const std::uint32_t start = triangle_at(v[0], at);
+    if (start == kNoIndex) return std::nullopt;
+    const Array<glm::dvec3>& p = mesh_.mesh.positions;
+    const glm::dvec3 middle = (p[v[0]] + p[v[1]] + p[v[2]]) / 3.0;
+    const std::uint32_t t = surface.walk(middle, start);
+    const ClosestPoint closest = closest_point(middle, surface.triangle(t));
+    const std::uint32_t* corners = surface.corners(t);
+    FitPoint point;
+    point.corners = {corners[0], corners[1], corners[2]};
+    point.weights = {static_cast<float>(1 - closest.b - closest.c), static_cast<float>(closest.b),
+                     static_cast<float>(closest.c)};
+    point.area = static_cast<float>(glm::length(glm::cross(p[v[1]] - p[v[0]], p[v[2]] - p[v[0]])));
+    if (mesh.normals.empty()) return point;
+    const Look here = look_at(mesh_.mesh, v, 1.0 / 3, 1.0 / 3);
+    const Look there = look_at(mesh, point.corners, closest.b, closest.c);
+    if (glm::dot(here.normal, there.normal) < kSameSide) return std::nullopt;
+    return point;
+  }
+
+  /// Gives a proxy normals, colours and occlusion that blend to those of level 0.
+  void fit(const MeshSurface& surface, const TrianglesAt& at, const ProxyVertices& of,
+           ChunkedMesh& proxy) const {
+    TriMesh& mesh = proxy.mesh;
+    std::vector<FitPoint> points;
+    std::vector<glm::vec4> shades;
+    std::vector<glm::vec4> colours;
+    const std::size_t step =
+        std::max<std::size_t>(1, triangles_in(mesh_) / (kFitted * triangles_in(proxy)));
+    std::size_t next = 0;
+    for (const Chunk& chunk : mesh_.chunks) {
+      for (; next < chunk.indices.size() / 3; next += step) {
+        std::array<std::uint32_t, 3> v{};
+        for (std::size_t k = 0; k < 3; ++k) v[k] = chunk.vertices[chunk.indices[3 * next + k]];
+        const std::optional<FitPoint> point = fit_point(v, surface, at, mesh);
+        if (!point) continue;
+        points.push_back(*point);
+        shades.push_back(
+            (shade_of(mesh_.mesh, v[0]) + shade_of(mesh_.mesh, v[1]) + shade_of(mesh_.mesh, v[2])) /
+            3.0f);
+        colours.push_back((colour_of(mesh_.mesh, v[0]) + colour_of(mesh_.mesh, v[1]) +
+                           colour_of(mesh_.mesh, v[2])) /
+                          3.0f);
+      }
+      next -= chunk.indices.size() / 3;
+    }
+    std::vector<glm::vec4> values(mesh.positions.size());
+    for (std::uint32_t v = 0; v < values.size(); ++v) values[v] = shade_of(mesh, v);
+    fit_attributes(points, shades, of.shades, values);
+    for (std::size_t v = 0; v < values.size(); ++v) {
+      const glm::vec3 normal(values[v]);
+      if (!mesh.normals.empty() && glm::length(normal) > 0)
+        mesh.normals[v] = glm::normalize(normal);
+      if (!mesh.occlusion.empty()) mesh.occlusion[v] = byte_of(values[v].w, 127);
+    }
+    if (mesh.colours.empty()) return;
+    for (std::uint32_t v = 0; v < values.size(); ++v) values[v] = colour_of(mesh, v);
+    fit_attributes(points, colours, of.looks, values);
+    for (std::size_t v = 0; v < values.size(); ++v) {
+      for (int k = 0; k < 4; ++k) mesh.colours[v][k] = byte_of(values[v][k], 255);
+    }
+  }
+
   /// As ChunkLevel::shading. mesh: what the surface is of.
   double shading_of(const MeshSurface& surface, const TrianglesAt& at, const TriMesh& mesh) {
     std::vector<LookDifference> differences(points_.middles.size());
     for (std::size_t i = 0; i < differences.size(); ++i) {
-      const std::size_t corner = 3 * std::size_t{points_.triangles[i]};
-      const std::uint32_t start = at[joined_.surface.places[joined_.surface.indices[corner]]];
+      const std::uint32_t start = triangle_at(points_.triangles[i][0], at);
       if (start == kNoIndex) continue;
       const std::uint32_t t = surface.walk(points_.middles[i], start);
       const ClosestPoint closest = closest_point(points_.middles[i], surface.triangle(t));
       const std::uint32_t* c = surface.corners(t);
       const Look there = look_at(mesh, {c[0], c[1], c[2]}, closest.b, closest.c);
-      differences[i] = {there, points_.looks[i],
-                        lengths_of_uv_[joined_.materials[points_.triangles[i]]], points_.areas[i]};
+      differences[i] = {there, points_.looks[i], lengths_of_uv_[points_.materials[i]],
+                        points_.areas[i]};
     }
     return cells_.smallest_pixel(differences);
   }
@@ -541,8 +647,8 @@ ProxyPlan plan_proxies(const ChunkedMesh& mesh, const LevelOptions& options) {
     at = std::min(at + kHalvingsApart, last);
   }
   if (!plan.halvings.empty()) {
-    plan.start =
-        static_cast<std::size_t>(kStart * static_cast<double>(triangles >> plan.halvings[0]));
+    plan.start = static_cast<std::size_t>(
+        kStart * static_cast<double>(level_triangles(triangles, plan.halvings[0])));
   }
   return plan;
 }
@@ -559,7 +665,7 @@ Result<std::vector<Proxy>> make_proxies(const ChunkedMesh& mesh,
   std::size_t written = 0;
   for (const std::uint32_t halving : halvings) {
     Proxy proxy;
-    MODAR_ASSIGN(const bool more, maker.make(triangles >> halving, proxy));
+    MODAR_ASSIGN(const bool more, maker.make(level_triangles(triangles, halving), proxy));
     if (!more) break;
     written += triangles_in(proxy.mesh);
     made.push_back(std::move(proxy));

@@ -18,7 +18,7 @@ struct ChunkLevel {
   std::vector<std::uint16_t> indices;
   double error = 0;     ///< model space: bounds the distance from level 0, and of level 0 from it
   double uv_shift = 0;  ///< texels: greatest shift of the texture at a vertex of level 0
-  double shading = 0;   ///< model space: of pixels of this side or more, 99 % show it as level 0
+  double shading = 0;   ///< model space: side of the smallest pixels that show too little of it
   std::uint32_t halvings = 0;  ///< of the model's triangles, at the level that this belongs to
 };
 
