@@ -15,7 +15,9 @@ inline constexpr std::uint32_t kMaxClipSamples =
     65536;  ///< nine minutes; keys count them in 16 bits
 /// Three vec4 of vertex uniforms each; the rest of ES 2.0's 128 is the program's.
 inline constexpr std::uint32_t kMostPartBones = 32;
-inline constexpr std::uint32_t kMaxJoints = 4096;  ///< of a bundle
+inline constexpr std::uint32_t kMostPartTargets = 4;  ///< morph targets: one vec4 of weights
+inline constexpr int kMorphUnits = 32767;             ///< of the farthest vertex of a target
+inline constexpr std::uint32_t kMaxJoints = 4096;     ///< of a bundle
 inline constexpr std::uint32_t kMaxClipTracks = 3 * kMaxJoints;
 
 enum class TrackPath : std::uint8_t { kTranslation = 1, kRotation = 2, kScale = 3 };

@@ -47,16 +47,19 @@ struct BoneRecord {
 };
 static_assert(sizeof(BoneRecord) == 64);
 
-/// A material whose chunks move. One bone: all of it. Several: each vertex has the attributes
-/// kJoints and kWeights.
+/// A material whose chunks move. One bone and no target: all of it. Else each vertex has the
+/// attributes kJoints and kWeights. A target's bone moves stored places before the others: its
+/// matrix's shift along x is how far the farthest vertex is moved, kMorphX to Z the vertex's part.
 struct PartRecord {
   std::uint32_t material;  ///< index into kMaterials; rising
   std::uint32_t first_bone;
-  std::uint32_t bone_count;  ///< 1 to kMostPartBones
-  std::uint32_t reserved;
+  std::uint32_t bone_count;    ///< 1 to kMostPartBones
+  std::uint32_t target_count;  ///< to kMostPartTargets: morph targets, whose bones follow
   float
       bounds_min[3];  ///< model space, conservative over all clips, the rest pose and stored places
   float bounds_max[3];
+
+  [[nodiscard]] bool rigid() const { return bone_count == 1 && target_count == 0; }
 };
 static_assert(sizeof(PartRecord) == 40);
 

@@ -89,7 +89,7 @@ MODAR_FIELDS(ProxyRecord, model, first_chunk, chunk_count, reserved);
 MODAR_FIELDS(ClipRecord, name, model, tracks, seconds, error, reserved);
 MODAR_FIELDS(JointRecord, model, parent, before, translation, rotation, scale);
 MODAR_FIELDS(BoneRecord, joint, reserved, inverse);
-MODAR_FIELDS(PartRecord, material, first_bone, bone_count, reserved, bounds_min, bounds_max);
+MODAR_FIELDS(PartRecord, material, first_bone, bone_count, target_count, bounds_min, bounds_max);
 MODAR_FIELDS(SceneClipRecord, scene, clip, flags, reserved);
 MODAR_FIELDS(ClipTracksHeader, track_count, sample_count, reserved);
 MODAR_FIELDS(TrackRecord, joint, path, reserved0, key_count, keys, low, step, reserved1);

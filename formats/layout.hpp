@@ -175,6 +175,9 @@ enum class Semantic : std::uint8_t {
   kNormalOct = 5,  ///< 2 components, octahedral
   kJoints = 6,     ///< 4 u8: bones of the part, PartRecord
   kWeights = 7,    ///< 4 normalised u8 whose sum is 255
+  kMorphX = 8,     ///< i16, one a morph target of the part: along x, in kMorphUnits
+  kMorphY = 9,
+  kMorphZ = 10,
 };
 enum class ComponentType : std::uint8_t {
   kHalf = 1,

@@ -370,13 +370,17 @@ bool components_fit(std::uint8_t semantic, std::uint8_t components) {
     case Semantic::kJoints:
     case Semantic::kWeights:
       return components == 4;
+    case Semantic::kMorphX:
+    case Semantic::kMorphY:
+    case Semantic::kMorphZ:
+      return components >= 1 && components <= kMostPartTargets;
   }
   return false;
 }
 
 bool known_semantic(std::uint8_t semantic) {
   return semantic >= static_cast<std::uint8_t>(Semantic::kPosition) &&
-         semantic <= static_cast<std::uint8_t>(Semantic::kWeights);
+         semantic <= static_cast<std::uint8_t>(Semantic::kMorphZ);
 }
 
 bool is_float(std::uint8_t type) {

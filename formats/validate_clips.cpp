@@ -61,13 +61,23 @@ void check_clip(const RecordCheck& check, const BundleParts& parts, std::uint32_
   if (fault != nullptr) check.fault(Rule::kClip, &clip.model, fault);
 }
 
-/// What parts of several bones need of their model's vertices.
-bool has_bone_attributes(const BundleParts& parts, const ModelRecord& model) {
+/// What a part that is not rigid needs of its model's vertices.
+bool has_bone_attributes(const BundleParts& parts, const ModelRecord& model,
+                         std::uint32_t targets) {
   if (model.layout >= parts.layouts.size()) return false;
   const LayoutRecord& layout = parts.layouts[model.layout];
   const AttributeRecord* joints = find_attribute(layout, Semantic::kJoints);
   const AttributeRecord* weights = find_attribute(layout, Semantic::kWeights);
   const auto bytes = static_cast<std::uint8_t>(ComponentType::kU8);
+  for (const Semantic semantic : {Semantic::kMorphX, Semantic::kMorphY, Semantic::kMorphZ}) {
+    const AttributeRecord* morph = find_attribute(layout, semantic);
+    if (targets > 0 && (morph == nullptr || morph->components < targets)) return false;
+    const bool words =
+        morph == nullptr ||
+        (morph->normalised == 0 && morph->type == static_cast<std::uint8_t>(ComponentType::kI16));
+    if (!words || (morph != nullptr && find_attribute(layout, Semantic::kColour) != nullptr))
+      return false;
+  }
   return joints != nullptr && weights != nullptr && joints->type == bytes &&
          weights->type == bytes && joints->normalised == 0 && weights->normalised == 1;
 }
@@ -84,21 +94,21 @@ bool bones_fit(const BundleParts& parts, const PartRecord& part) {
     model = m;
   }
   if (model == kNone) return false;
-  for (std::uint32_t b = 0; b < part.bone_count; ++b) {
+  for (std::uint32_t b = 0; b < part.bone_count + part.target_count; ++b) {
     const std::uint32_t joint = parts.bones[part.first_bone + b].joint;
     if (joint >= parts.joints.size() || parts.joints[joint].model != model) return false;
   }
-  return part.bone_count == 1 || has_bone_attributes(parts, parts.models[model]);
+  return part.rigid() || has_bone_attributes(parts, parts.models[model], part.target_count);
 }
 
 void check_part(const RecordCheck& check, const BundleParts& parts, std::uint32_t index) {
   const PartRecord& part = parts.parts[index];
   check.numbers(part.bounds_min, "bounds_min");
   check.numbers(part.bounds_max, "bounds_max");
-  check.reserved(&part.reserved, sizeof(part.reserved));
   bool good = part.material < parts.materials.size() && part.bone_count > 0 &&
-              part.bone_count <= kMostPartBones && part.first_bone <= parts.bones.size() &&
-              part.bone_count <= parts.bones.size() - part.first_bone &&
+              part.bone_count <= kMostPartBones && part.target_count <= kMostPartTargets &&
+              part.first_bone <= parts.bones.size() &&
+              part.bone_count + part.target_count <= parts.bones.size() - part.first_bone &&
               (index == 0 || parts.parts[index - 1].material < part.material);
   for (int axis = 0; axis < 3; ++axis) {
     good = good && part.bounds_min[axis] <= part.bounds_max[axis];

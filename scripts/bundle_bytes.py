@@ -109,7 +109,7 @@ TABLES = {
     21: ("clips", Record("name:N model:I tracks:I seconds:f error:f reserved:2I")),
     22: ("joints", Record("model:I parent:I before:12f translation:3f rotation:4f scale:3f")),
     23: ("bones", Record("joint:I reserved:3I inverse:12f")),
-    24: ("parts", Record("material:I first_bone:I bone_count:I reserved:I bounds_min:3f bounds_max:3f")),
+    24: ("parts", Record("material:I first_bone:I bone_count:I target_count:I bounds_min:3f bounds_max:3f")),
     25: ("scene_clips", Record("scene:I clip:I flags:I reserved:I")),
     32: ("textures", Record("name:N width:I height:I source_width:I source_height:I format:I "
                             "flags:I first_level:I level_count:I psnr_db:f ssim:f reserved:4I")),

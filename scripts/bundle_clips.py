@@ -78,17 +78,23 @@ def check_clips(bundle):
 def check_parts(tables):
     bones, joints, last = tables["bones"], tables["joints"], -1
     for row in tables["parts"]:
-        first, count = row["first_bone"], row["bone_count"]
-        need(last < row["material"] < len(tables["materials"]) and 1 <= count <= 32 and first + count <= len(bones) and
+        first, count, targets = row["first_bone"], row["bone_count"], row["target_count"]
+        end = first + count + targets
+        need(last < row["material"] < len(tables["materials"]) and 1 <= count <= 32 and targets <= 4 and end <= len(bones) and
              all(low <= high for low, high in zip(row["bounds_min"], row["bounds_max"])), RULE, row["at"], "a part")
         last = row["material"]
         owner = next((i for i, model in enumerate(tables["models"])
                       if 0 <= last - model["first_material"] < model["material_count"]), None)
         need(owner is not None and all(bone["joint"] < len(joints) and joints[bone["joint"]]["model"] == owner
-                                       for bone in bones[first:first + count]), RULE, row["at"], "bones of another model")
-        kinds = {part["semantic"]: (part["type"], part["normalised"])
+                                       for bone in bones[first:end]), RULE, row["at"], "bones of another model")
+        kinds = {part["semantic"]: (part["type"], part["normalised"], part["components"])
                  for part in tables["layouts"][tables["models"][owner]["layout"]]["attributes"]}
-        need(count == 1 or (kinds.get(6), kinds.get(7)) == ((5, 0), (5, 1)), RULE, row["at"], "no bones in vertices")
+        need(count + targets == 1 or (kinds.get(6), kinds.get(7)) == ((5, 0, 4), (5, 1, 4)), RULE, row["at"],
+             "no bones in vertices")
+        morphs = [kinds[semantic] for semantic in (8, 9, 10) if semantic in kinds]
+        need(count + targets == 1 or all(kind[:2] == (2, 0) for kind in morphs) and not (morphs and 4 in kinds), RULE,
+             row["at"], "morph targets")
+        need(not targets or len(morphs) == 3 and min(kind[2] for kind in morphs) >= targets, RULE, row["at"], "no targets")
 
 
 def check_bones(bundle, chunk, joints, weights):

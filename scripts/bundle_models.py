@@ -5,8 +5,9 @@ import struct
 from bundle_bytes import ATTRIBUTE, COMPONENTS, NONE, at_least, digest, flags_known, follow, need
 from bundle_clips import check_bones
 
-SEMANTICS = {1: "positions", 2: "normals", 3: "uvs", 4: "colours", 5: "normals", 6: "joints", 7: "weights"}
-WIDTHS = {1: (3, 4), 2: (3,), 3: (2,), 4: (4,), 5: (2,), 6: (4,), 7: (4,)}
+SEMANTICS = {1: "positions", 2: "normals", 3: "uvs", 4: "colours", 5: "normals", 6: "joints", 7: "weights",
+             8: "morph_x", 9: "morph_y", 10: "morph_z"}
+WIDTHS = {1: (3, 4), 2: (3,), 3: (2,), 4: (4,), 5: (2,), 6: (4,), 7: (4,), **dict.fromkeys((8, 9, 10), (1, 2, 3, 4))}
 LENGTH_STEP = {1: 0.02, 2: 2e-3, 4: 1e-4}  # by bytes of a component
 
 

@@ -3,7 +3,7 @@
 // items, a slot is three rows of the affine matrix from attribute space to eye space, and the scale
 // and offset of uv; light comes in eye space.
 // Defines: NORMAL_XYZ or NORMAL_OCT; TEXTURED; COLOURED; SHINY (adds a highlight, what it mirrors, emission);
-// SKINNED (bones turn vertices in model space, which is attribute space then);
+// SKINNED (bones turn vertices in model space, which is attribute space then), with it MORPHED;
 // SLOT_STREAM with SLOT_COUNT (a vertex chooses its slot), or SLOT_ATTRIBUTES (rows step once an
 // instance), or neither: one item, whose matrix keeps angles.
 //
@@ -17,6 +17,13 @@ attribute vec4 a_joints;
 attribute vec4 a_weights;
 uniform vec4 u_bones[96];
 uniform vec4 u_decode;
+#ifdef MORPHED
+// Of four targets: a vertex's way along an axis, and how much of each.
+attribute vec4 a_morph_x;
+attribute vec4 a_morph_y;
+attribute vec4 a_morph_z;
+uniform vec4 u_morph;
+#endif
 vec4 bone0 = vec4(0.0);
 vec4 bone1 = vec4(0.0);
 vec4 bone2 = vec4(0.0);
@@ -122,7 +129,11 @@ void main() {
   vec4 uv_map = u_slots[3];
 #endif
 #ifdef SLOT_STREAM
+#ifdef SKINNED
+  int base = 0;
+#else
   int base = 4 * int(a_slot + 0.5);
+#endif
   vec4 row0 = u_slots[base];
   vec4 row1 = u_slots[base + 1];
   vec4 row2 = u_slots[base + 2];
@@ -134,6 +145,9 @@ void main() {
   add_bone(a_joints.z, a_weights.z);
   add_bone(a_joints.w, a_weights.w);
   vec4 rest = vec4(u_decode.xyz + u_decode.w * a_position, 1.0);
+#ifdef MORPHED
+  rest.xyz += vec3(dot(a_morph_x, u_morph), dot(a_morph_y, u_morph), dot(a_morph_z, u_morph));
+#endif
   vec4 point = vec4(dot(bone0, rest), dot(bone1, rest), dot(bone2, rest), 1.0);
 #else
   vec4 point = vec4(a_position, 1.0);

@@ -35,7 +35,9 @@ JointRecord joint_record(const SourceJoint& joint, std::uint32_t model, std::uin
   record.model = model;
   const bool root = joint.parent == kNoJoint;
   record.parent = root ? kNone : first + joint.parent;
-  put_rows(root ? to_model * joint.before : joint.before, record.before);
+  glm::dmat4 before = root ? to_model * joint.before : joint.before;
+  if (joint.weighs) before = to_model[0][0] * joint.before;
+  put_rows(before, record.before);
   const glm::dvec4 rotation = glm::normalize(joint.rest.rotation);
   for (int i = 0; i < 4; ++i) record.rotation[i] = static_cast<float>(rotation[i]);
   for (int i = 0; i < 3; ++i) {
@@ -52,7 +54,7 @@ void add_parts(const ModelMovement& movement, const std::vector<std::uint32_t>& 
   std::vector<std::uint32_t> first_bone(movement.source.parts.size(), kNone);
   for (std::uint32_t m = 0; m < parts.size(); ++m) {
     if (parts[m] >= first_bone.size()) continue;
-    const std::vector<SourceBone>& bones = movement.source.parts[parts[m]].bones;
+    const auto& [bones, targets] = movement.source.parts[parts[m]];
     std::uint32_t& first = first_bone[parts[m]];
     if (first == kNone) {
       first = static_cast<std::uint32_t>(content.bones.size());
@@ -62,11 +64,18 @@ void add_parts(const ModelMovement& movement, const std::vector<std::uint32_t>& 
         put_rows(bone.inverse * from_model, record.inverse);
         content.bones.push_back(record);
       }
+      for (const std::uint32_t target : targets) {
+        BoneRecord record{};
+        record.joint = first_joint + target;
+        put_rows(glm::dmat4(1.0), record.inverse);
+        content.bones.push_back(record);
+      }
     }
     PartRecord record{};
     record.material = content.models.back().first_material + m;
     record.first_bone = first;
     record.bone_count = static_cast<std::uint32_t>(bones.size());
+    record.target_count = static_cast<std::uint32_t>(targets.size());
     const FittedMovement::Box& box = movement.fitted.boxes[parts[m]];
     for (int i = 0; i < 3; ++i) {
       record.bounds_min[i] =
@@ -76,6 +85,11 @@ void add_parts(const ModelMovement& movement, const std::vector<std::uint32_t>& 
     }
     content.parts.push_back(record);
   }
+}
+
+/// Keys at time 0 alone: nothing moves while it plays.
+bool is_pose(double seconds) {
+  return seconds <= 1.0 / kClipRate + 1e-6;
 }
 
 std::string clip_name(const BundleContent& content, std::uint32_t clip) {
@@ -123,13 +137,14 @@ Diagnostic clips_found(const std::string& model, const FittedMovement& fitted) {
   std::vector<std::string> names;
   for (const FittedMovement::Clip& clip : fitted.clips) names.push_back(clip.name);
   const bool several = names.size() > 1;
+  const bool pose = is_pose(fitted.clips[0].seconds);
   return {"model.clips",
           DiagnosticSeverity::kInfo,
           model,
           0,
           (several ? "it has the clips " + quoted(names) + ": scenes play the first"
                    : "scenes play its clip " + quoted(names)) +
-              " in a loop",
+              (pose ? ", a pose" : " in a loop"),
           several ? "--scene PATTERN=" + model + ",clip=" + names[1] +
                         " plays another, clip=none keeps it still"
                   : "--scene PATTERN=" + model + ",clip=none keeps it still"};
@@ -154,8 +169,11 @@ Result<void> add_scene_clips(const std::vector<SceneRequest>& scenes, BundleCont
     // A clip of that name comes before the word.
     if (names.empty() || (found == names.end() && scene.clip == kNoClip)) continue;
     const auto index = found == names.end() ? 0 : found - names.begin();
-    content.scene_clips.push_back({s, first + static_cast<std::uint32_t>(index),
-                                   scene.once ? 0u : std::uint32_t{kSceneClipLoops}, 0});
+    const std::uint32_t chosen = first + static_cast<std::uint32_t>(index);
+    content.scene_clips.push_back(
+        {s, chosen,
+         scene.once || is_pose(content.clips[chosen].seconds) ? 0u : std::uint32_t{kSceneClipLoops},
+         0});
   }
   return {};
 }

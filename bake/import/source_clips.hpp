@@ -28,10 +28,13 @@ inline constexpr std::uint32_t kNoJoint = 0xFFFFFFFFu;
 
 /// A node that a clip moves. parent: of a lower index, or kNoJoint. before: from the parent's space
 /// (the scene's) to that of the joint's place, through the nodes between, which nothing moves.
+/// weighs: no node, but a morph target: its translation along x is the weight, which `before` turns
+/// into the way of the farthest vertex from where it is stored.
 struct SourceJoint {
   std::uint32_t parent = kNoJoint;
   glm::dmat4 before{1.0};
   JointPlace rest;
+  bool weighs = false;
 };
 
 enum class Interpolation : std::uint8_t { kStep, kLinear, kCubic };
@@ -61,15 +64,20 @@ struct SourceBone {
   glm::dmat4 inverse{1.0};
 };
 
-/// Faces of one material that move with at most kMostPartBones bones.
+/// Faces of one material that move with at most kMostPartBones bones and kMostPartTargets targets.
 struct SourcePart {
   std::vector<SourceBone> bones;
+  std::vector<std::uint32_t> targets;  ///< joints that weigh
+
+  [[nodiscard]] bool rigid() const { return bones.size() == 1 && targets.empty(); }
 };
 
 /// Of a vertex: bones of its part, and the share of each; the sum is 1.
 struct VertexBones {
   std::array<std::uint8_t, 4> bones{};
   std::array<float, 4> weights{1.0f, 0.0f, 0.0f, 0.0f};
+  /// Its way along x of each target of its part, then y and z: in kMorphUnits of the farthest.
+  std::array<std::array<std::int16_t, kMostPartTargets>, 3> morphs{};
 
   /// In 255ths, whose sum is 255.
   [[nodiscard]] std::array<std::uint8_t, 4> bytes() const;

@@ -97,7 +97,7 @@ RecordRange bones_of(const BundleView& bundle, std::uint32_t model) {
   for (std::uint32_t i = parts.first; i < parts.first + parts.count; ++i) {
     const PartRecord& part = bundle.moving_parts()[i];
     first = std::min(first, part.first_bone);
-    end = std::max(end, part.first_bone + part.bone_count);
+    end = std::max(end, part.first_bone + part.bone_count + part.target_count);
   }
   return parts.count == 0 ? RecordRange{} : RecordRange{first, end - first};
 }

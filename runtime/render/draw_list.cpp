@@ -186,7 +186,7 @@ std::span<const DrawItem> DrawList::pose(const BundleView& bundle,
       DrawItem& moved = posed_.back();
       moved.model = moved.node = kNone;
       moved.bones += part.first_bone - first_bone;
-      if (part.bone_count > 1) continue;
+      if (!part.rigid()) continue;
       const BoneMatrix& bone = *moved.bones;
       for (int c = 0; c < 4; ++c)
         moved.to_eye[c] = item.to_eye * glm::vec4(bone[0][c], bone[1][c], bone[2][c], c / 3);
@@ -265,11 +265,28 @@ bool DrawList::use_there(const BundleView& bundle, std::size_t first,
   return true;
 }
 
-ChunkRecord boxed(const ChunkRecord& chunk, const PartRecord& part) {
+ChunkRecord boxed(const ChunkRecord& chunk, const PartRecord& part, const BoneMatrix* bones) {
   ChunkRecord moved = chunk;
-  std::copy_n(part.bounds_min, 3, moved.bounds_min);
-  std::copy_n(part.bounds_max, 3, moved.bounds_max);
   moved.cone_cutoff = 2.0f;
+  float away = 0;  // by morph targets
+  for (std::uint32_t t = 0; t < part.target_count; ++t)
+    away += std::abs(bones[part.bone_count + t][0].w);
+  for (int row = 0; row < 3; ++row) {
+    moved.bounds_min[row] = std::numeric_limits<float>::infinity();
+    moved.bounds_max[row] = -std::numeric_limits<float>::infinity();
+    for (std::uint32_t b = 0; b < part.bone_count; ++b) {
+      const glm::vec4& line = bones[b][row];
+      float middle = line.w;
+      float reach = 0;
+      for (int axis = 0; axis < 3; ++axis) {
+        middle += line[axis] * 0.5f * (chunk.bounds_min[axis] + chunk.bounds_max[axis]);
+        reach += std::abs(line[axis]) *
+                 (0.5f * (chunk.bounds_max[axis] - chunk.bounds_min[axis]) + away);
+      }
+      moved.bounds_min[row] = std::min(moved.bounds_min[row], middle - reach);
+      moved.bounds_max[row] = std::max(moved.bounds_max[row], middle + reach);
+    }
+  }
   return moved;
 }
 
@@ -287,7 +304,9 @@ int DrawList::add_group(const Request& request, std::uint32_t item, std::uint32_
     const ModelView& view = views_[drawn];
     const ChunkRecord& rest = bundle.chunks()[c];
     ChunkRecord box;
-    const ChunkRecord& chunk = skinned ? (box = boxed(rest, bundle.moving_parts()[part])) : rest;
+    const ChunkRecord& chunk =
+        skinned ? (box = boxed(rest, bundle.moving_parts()[part], request.items[drawn].bones))
+                : rest;
     const MaterialRecord& material = bundle.materials()[chunk.material];
     const bool two_sided = (material.flags & kMaterialTwoSided) != 0;
     if (outside_frustum(view, chunk) || (!two_sided && faces_away(view, chunk))) {
@@ -393,8 +412,23 @@ DepthRange depth_range(const BundleView& bundle, std::span<const DrawItem> items
     const glm::dmat4 to_eye(item.to_eye);
     if (is_picture(bundle, item.node)) add_box(to_eye, {-1, -1, 0}, {1, 1, 0}, depths);
     if (item.model >= bundle.models().size()) continue;
-    visit_boxes(bundle, bundle.models()[item.model],
-                [&](const auto& least, const auto& most) { add_box(to_eye, least, most, depths); });
+    const ModelRecord& model = bundle.models()[item.model];
+    if (item.bones == nullptr) {
+      visit_boxes(bundle, model, [&](const auto& least, const auto& most) {
+        add_box(to_eye, least, most, depths);
+      });
+      continue;
+    }
+    const std::uint32_t first_bone = bones_of(bundle, item.model).first;
+    for (std::uint32_t c = model.first_chunk; c < model.first_chunk + model.chunk_count; ++c) {
+      ChunkRecord chunk = bundle.chunks()[c];
+      const std::uint32_t part = part_of(bundle, chunk.material);
+      if (part != kNone) {
+        const PartRecord& moving = bundle.moving_parts()[part];
+        chunk = boxed(chunk, moving, item.bones + (moving.first_bone - first_bone));
+      }
+      add_box(to_eye, chunk.bounds_min, chunk.bounds_max, depths);
+    }
   }
   if (!(depths.farthest > 0.0) || !std::isfinite(depths.farthest)) return {};
   DepthRange range;

@@ -50,9 +50,8 @@ float eye_distance(const ModelView& view, const ChunkRecord& chunk);
 std::uint32_t choose_level(const ModelView& view, const ChunkRecord& chunk,
                            const Table<LevelRecord>& levels, float pixels);
 
-/// The chunk with its part's box, which holds it in every pose of the clips, and never culled by
-/// its cone.
-ChunkRecord boxed(const ChunkRecord& chunk, const PartRecord& part);
+/// The chunk with a box that holds it in any pose, and never culled by its cone. bones: the part's.
+ChunkRecord boxed(const ChunkRecord& chunk, const PartRecord& part, const BoneMatrix* bones);
 
 /// The coarsest proxy of a model whose error is at most `pixels` on the screen, as a chunk group
 /// of the bundle; kNone: none exists.

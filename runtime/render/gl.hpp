@@ -21,6 +21,9 @@ enum AttributeSlot : GLuint {
   kAttributeSlot = 4,    ///< the vertex's own choice of a slot
   kAttributeRows = 5,    ///< the first of three rows that step once an instance
   kAttributeJoints = 5,  ///< and weights behind it, of vertices that bones turn: no instances
+  kAttributeMorphX = 7,
+  kAttributeMorphY = 4,
+  kAttributeMorphZ = 3,  ///< a layout has these or colours
   kAttributeCount = 8,
 };
 

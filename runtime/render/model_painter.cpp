@@ -14,8 +14,6 @@
 namespace modar {
 namespace {
 
-constexpr std::uint32_t kSkinAttributes = 3u << kAttributeJoints;
-
 /// Copies that one call draws at most; 59 fit into the uniforms that every ES 3 has.
 constexpr int kMostSlots = 64;
 
@@ -159,7 +157,7 @@ Result<void> ModelPainter::create(const TextureStore& textures, const GlExtensio
       const MaterialRecord& material = bundle_.materials()[bundle_.chunks()[c].material];
       ProgramKey key;
       key.normal = format.normal;
-      key.coloured = format.attributes[kAttributeColour].components != 0;
+      key.coloured = (format.enabled >> kAttributeColour & 1) != 0;
       key.textured = material.texture != kNone && format.attributes[kAttributeUv].components != 0;
       key.alpha_twin = key.textured && textures.alpha(material.texture) != 0;
       key.cut_out = key.alpha_twin && material.opacity >= 1.0f &&
@@ -167,9 +165,10 @@ Result<void> ModelPainter::create(const TextureStore& textures, const GlExtensio
       key.shiny = shines(material) || glows(material) || mirrors(material);
       setups_[c].part = part_of(bundle_, bundle_.chunks()[c].material);
       const bool bends =
-          setups_[c].part != kNone && bundle_.moving_parts()[setups_[c].part].bone_count > 1;
+          setups_[c].part != kNone && !bundle_.moving_parts()[setups_[c].part].rigid();
       for (const bool skinned : {false, true}) {
         key.skinned = skinned;
+        key.morphed = skinned && (format.moving >> kAttributeMorphX & 1) != 0;
         if (skinned && !bends) continue;
         MODAR_ASSIGN((skinned ? setups_[c].skinned : setups_[c].program), program_of(key));
       }
@@ -369,28 +368,34 @@ void ModelPainter::set_slot(const PaintJob& job, ProgramState& state, const Piec
 
 void ModelPainter::set_bones(const PaintJob& job, const ProgramState& state, const Piece& piece) {
   const ChunkRecord& chunk = bundle_.chunks()[piece.chunk];
-  const std::uint32_t bones = bundle_.moving_parts()[setups_[piece.chunk].part].bone_count;
+  const PartRecord& part = bundle_.moving_parts()[setups_[piece.chunk].part];
+  const BoneMatrix* const matrices = job.items[piece.item].bones;
+  const std::uint32_t bones = part.bone_count;
   glUniform4fv(state.program.bones, static_cast<GLsizei>(3 * bones),
-               glm::value_ptr((*job.items[piece.item].bones)[0]));
+               glm::value_ptr((*matrices)[0]));
   job.stats.bytes_uploaded += bones * sizeof(BoneMatrix);
   set_vector(state.program.decode,
              {chunk.position_offset[0], chunk.position_offset[1], chunk.position_offset[2],
               chunk.position_step},
              job.stats);
+  if (!state.program.key.morphed) return;
+  glm::vec4 weights(0.0f);
+  for (std::uint32_t t = 0; t < part.target_count; ++t)
+    weights[static_cast<int>(t)] = matrices[bones + t][0].w / kMorphUnits;
+  set_vector(state.program.morph, weights, job.stats);
 }
 
 void ModelPainter::set_attributes(std::uint32_t layout, GLuint buffer, std::uintptr_t offset,
-                                  std::uint32_t more, GlState& gl) const {
+                                  std::uint32_t more, GlState& gl, bool moving) const {
   const VertexFormat& format = formats_[layout];
-  const bool skinned = more == kSkinAttributes;
-  for (GLuint i = 0; i < (skinned ? format.attributes.size() : kFormatJoints); ++i) {
+  const std::uint32_t own = format.enabled | (moving ? format.moving : 0);
+  for (GLuint i = 0; i < kAttributeCount; ++i) {
     const VertexAttribute& attribute = format.attributes[i];
-    if (attribute.components == 0) continue;
-    const GLuint location = i < kFormatJoints ? i : i - kFormatJoints + kAttributeJoints;
-    gl.set_attribute(location, {buffer, attribute.components, attribute.type, attribute.normalised,
-                                static_cast<GLsizei>(format.stride), offset + attribute.offset});
+    if ((own >> i & 1) == 0) continue;
+    gl.set_attribute(i, {buffer, attribute.components, attribute.type, attribute.normalised,
+                         static_cast<GLsizei>(format.stride), offset + attribute.offset});
   }
-  gl.enable_attributes(format.enabled | more);
+  gl.enable_attributes(own | more);
 }
 
 namespace {
@@ -511,10 +516,9 @@ void ModelPainter::draw_piece(const PaintJob& job, const Piece& piece) {
   set_slot(job, state, piece);
   const bool bends = skinned(piece);
   // Rows of instances may have been there.
-  for (GLuint i = 0; i < 2 && bends && extensions_.instancing(); ++i)
+  for (GLuint i = 0; i < 3 && bends && extensions_.instancing(); ++i)
     extensions_.vertex_attrib_divisor(kAttributeJoints + i, 0);
-  set_attributes(piece.layout, place.vertex_buffer, place.vertex_offset,
-                 bends ? kSkinAttributes : 0, job.gl);
+  set_attributes(piece.layout, place.vertex_buffer, place.vertex_offset, 0, job.gl, bends);
   const auto order = order_of(piece.chunk, piece.mesh.level);
   const bool ordered = !order.empty() && job.list.view(piece.item).perspective;
   if (ordered) {

@@ -127,7 +127,7 @@ class ModelPainter {
   void set_slot(const PaintJob& job, ProgramState& state, const Piece& piece);
   void set_bones(const PaintJob& job, const ProgramState& state, const Piece& piece);
   void set_attributes(std::uint32_t layout, GLuint buffer, std::uintptr_t offset,
-                      std::uint32_t more, GlState& gl) const;
+                      std::uint32_t more, GlState& gl, bool moving = false) const;
   [[nodiscard]] bool skinned(const Piece& piece) const {
     return programs_[piece.program].by_slots[0].program.key.skinned;
   }

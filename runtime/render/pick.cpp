@@ -65,10 +65,14 @@ double meet_square(const Ray& ray, double nearest) {
 
 /// A vertex of the rest pose where bones turn it; without attributes, the first one turns all.
 glm::dvec3 turned(const LayoutRecord& layout, const std::byte* vertex, const PartRecord& part,
-                  const BoneMatrix* bones, const glm::dvec3& rest) {
+                  const BoneMatrix* bones, glm::dvec3 rest) {
   const AttributeRecord* joints = find_attribute(layout, Semantic::kJoints);
   const AttributeRecord* weights = find_attribute(layout, Semantic::kWeights);
-  const bool rigid = part.bone_count == 1 || joints == nullptr || weights == nullptr;
+  const bool rigid = part.rigid() || joints == nullptr || weights == nullptr;
+  for (std::uint32_t t = 0; t < part.target_count; ++t) {
+    const double most = static_cast<double>(bones[part.bone_count + t][0].w);
+    for (int axis = 0; axis < 3; ++axis) rest[axis] += most * morph_part(layout, vertex, axis, t);
+  }
   glm::dvec3 sum(0.0);
   for (std::uint32_t i = 0; i < (rigid ? 1 : 4); ++i) {
     const double weight = rigid ? 1.0 : decode_component(*weights, vertex, i);
@@ -88,9 +92,9 @@ double meet_chunk(const BundleView& bundle, const DrawItem& item, const ChunkRec
   const LayoutRecord& layout = bundle.layouts()[bundle.models()[item.model].layout];
   const std::uint32_t number = item.bones == nullptr ? kNone : part_of(bundle, rest.material);
   const PartRecord* part = number == kNone ? nullptr : &bundle.moving_parts()[number];
-  const ChunkRecord chunk = part == nullptr ? rest : boxed(rest, *part);
   const BoneMatrix* bones = item.bones;
   if (part != nullptr) bones += part->first_bone - bones_of(bundle, item.model).first;
+  const ChunkRecord chunk = part == nullptr ? rest : boxed(rest, *part, bones);
   const AttributeRecord* position = find_attribute(layout, Semantic::kPosition);
   const LevelRecord& level = bundle.levels()[chunk.first_level];
   if (position == nullptr || !meets_box(ray, chunk, nearest)) return nearest;

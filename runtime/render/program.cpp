@@ -68,6 +68,9 @@ void name_attributes(GLuint program) {
   glBindAttribLocation(program, kAttributeRows + 2, "a_row2");
   glBindAttribLocation(program, kAttributeJoints, "a_joints");
   glBindAttribLocation(program, kAttributeJoints + 1, "a_weights");
+  glBindAttribLocation(program, kAttributeMorphX, "a_morph_x");
+  glBindAttribLocation(program, kAttributeMorphY, "a_morph_y");
+  glBindAttribLocation(program, kAttributeMorphZ, "a_morph_z");
 }
 
 std::string model_defines(const ProgramKey& key) {
@@ -81,6 +84,7 @@ std::string model_defines(const ProgramKey& key) {
   if (key.coloured) define("COLOURED");
   if (key.shiny) define("SHINY");
   if (key.skinned) define("SKINNED");
+  if (key.morphed) define("MORPHED");
   if (key.slots == SlotKind::kAttributes) define("SLOT_ATTRIBUTES");
   if (key.slots == SlotKind::kStream) {
     char digits[12] = "";
@@ -132,6 +136,7 @@ Result<ModelProgram> make_model_program(const ProgramKey& key) {
   program.eye = place("u_eye");
   program.bones = place("u_bones");
   program.decode = place("u_decode");
+  program.morph = place("u_morph");
   program.sky = place("u_sky");
   program.to_key = place("u_key");
   program.key_colour = place("u_key_colour");

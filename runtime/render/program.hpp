@@ -23,6 +23,7 @@ struct ProgramKey {
   bool coloured = false;
   bool shiny = false;    ///< has a highlight or emission, or mirrors
   bool skinned = false;  ///< bones turn its vertices
+  bool morphed = false;  ///< skinned, and morph targets move them before
   int slot_count = 1;    ///< of kStream
   bool operator==(const ProgramKey&) const = default;
 };
@@ -38,6 +39,7 @@ struct ModelProgram {
   GLint eye = -1;
   GLint bones = -1;  ///< of skinned, and the next one
   GLint decode = -1;
+  GLint morph = -1;  ///< of morphed
   GLint sky = -1;
   GLint to_key = -1;  ///< direction of the key light
   GLint key_colour = -1;

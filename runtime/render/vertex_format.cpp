@@ -26,8 +26,7 @@ GLenum gl_type(ComponentType type, GLenum half_type) {
   return GL_FLOAT;
 }
 
-/// The place in VertexFormat::attributes; kAttributeCount where a model shader has no such
-/// attribute.
+/// kAttributeCount where a model shader has no such attribute.
 std::uint32_t place_of(Semantic semantic) {
   switch (semantic) {
     case Semantic::kPosition:
@@ -40,9 +39,15 @@ std::uint32_t place_of(Semantic semantic) {
     case Semantic::kColour:
       return kAttributeColour;
     case Semantic::kJoints:
-      return kFormatJoints;
+      return kAttributeJoints;
     case Semantic::kWeights:
-      return kFormatJoints + 1;
+      return kAttributeJoints + 1;
+    case Semantic::kMorphX:
+      return kAttributeMorphX;
+    case Semantic::kMorphY:
+      return kAttributeMorphY;
+    case Semantic::kMorphZ:
+      return kAttributeMorphZ;
   }
   return kAttributeCount;
 }
@@ -97,7 +102,7 @@ VertexFormat vertex_format(const LayoutRecord& layout, GLenum half_type, std::ui
     attribute.offset = format.widened ? end : record.offset;
     // Attributes of a rewritten vertex start at multiples of 4, which every GPU reads fastest.
     end += ((widen ? 2 * attribute.bytes : attribute.bytes) + 3) & ~3u;
-    if (place < kFormatJoints) format.enabled |= 1u << place;
+    (semantic < Semantic::kJoints ? format.enabled : format.moving) |= 1u << place;
     if (semantic == Semantic::kNormal) format.normal = NormalKind::kXyz;
     if (semantic == Semantic::kNormalOct) format.normal = NormalKind::kOctahedral;
   }

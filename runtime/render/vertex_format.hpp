@@ -21,16 +21,15 @@ struct VertexAttribute {
   std::uint32_t bytes = 0;          ///< as the bundle has it
 };
 
-inline constexpr std::uint32_t kFormatJoints = 4;
-
-/// Indexed by AttributeSlot: position, normal, uv, colour; then joints and weights.
+/// Indexed by AttributeSlot.
 struct VertexFormat {
-  std::array<VertexAttribute, 6> attributes{};
+  std::array<VertexAttribute, kAttributeCount> attributes{};
   NormalKind normal = NormalKind::kAbsent;
   std::uint32_t source_stride = 0;
   std::uint32_t stride = 0;   ///< as uploaded
   bool widened = false;       ///< halves become floats
-  std::uint32_t enabled = 0;  ///< bit mask of AttributeSlot, without joints and weights
+  std::uint32_t enabled = 0;  ///< bit mask of AttributeSlot, without the next one's
+  std::uint32_t moving = 0;   ///< the same of what bones and morph targets need
 };
 
 /// half_type: what the context calls half floats; 0: it reads none. Attributes of unknown semantics

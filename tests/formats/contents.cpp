@@ -649,7 +649,12 @@ BundleContent skinned_content() {
   layout.attributes[layout.attribute_count++] = {6, 5, 4, 0, stride, 0};
   layout.attributes[layout.attribute_count++] = {7, 5, 4, 1, static_cast<std::uint16_t>(stride + 4),
                                                  0};
-  layout.stride = static_cast<std::uint16_t>(stride + 8);
+  for (const int i : {0, 1, 2}) {
+    const auto at = static_cast<std::uint16_t>(stride + 8 + 4 * i);
+    layout.attributes[layout.attribute_count++] = {
+        static_cast<std::uint8_t>(8 + i), 2, 2, 0, at, 0};
+  }
+  layout.stride = static_cast<std::uint16_t>(stride + 20);
   Bytes vertices;
   for (std::size_t v = 0; v < content.vertices.size(); v += stride) {
     vertices.insert(vertices.end(), content.vertices.begin() + static_cast<std::ptrdiff_t>(v),
@@ -657,6 +662,8 @@ BundleContent skinned_content() {
     for (const int byte : {1, 0, 0, 0, 200, 55, 0, 0}) {
       vertices.push_back(static_cast<std::byte>(byte));
     }
+    for (const int way : {100, -32767, 0, 7, 32767, 0})
+      put(vertices, static_cast<std::int16_t>(way));
   }
   content.vertices = std::move(vertices);
   JointRecord joint{};
@@ -665,9 +672,9 @@ BundleContent skinned_content() {
   BoneRecord bone{};
   for (int i = 0; i < 3; ++i) joint.before[5 * i] = joint.scale[i] = bone.inverse[5 * i] = 1;
   content.joints = {joint, joint};
-  content.bones = {bone, bone};
-  content.bones[1].joint = 1;
-  content.parts = {{0, 0, 2, 0, {-2, -2, -2}, {2, 2, 2}}};
+  content.bones = {bone, bone, bone, bone};
+  content.bones[1].joint = content.bones[3].joint = 1;
+  content.parts = {{0, 0, 2, 2, {-2, -2, -2}, {2, 2, 2}}};
   content.clips = {{content.intern("wave"), 0, 0, 1, 0.0009765625f, {0, 0}}};
   content.clip_tracks = {tracks_of_clip()};
   return content;

@@ -127,8 +127,8 @@ void add_digests(const BundleView& view, const LayoutRecord& layout, const Chunk
     for (std::size_t v = 0; v < level.vertex_count; ++v) {
       append_decoded(attribute, chunk, first + v * layout.stride, values);
     }
-    const char* names[] = {"",        "positions", "normals", "uvs",
-                           "colours", "normals",   "joints",  "weights"};
+    const char* names[] = {"",       "positions", "normals", "uvs",     "colours", "normals",
+                           "joints", "weights",   "morph_x", "morph_y", "morph_z"};
     out[names[attribute.semantic]] = digest(values.data(), values.size() * sizeof(double));
   }
   out["indices"] = digest(view.indices().subspan(level.index_offset, level.index_count * 2));
@@ -379,7 +379,8 @@ json dump_parts(const BundleView& view) {
   json rows = json::array();
   for (const PartRecord& record : view.moving_parts()) {
     json out;
-    GET(material), GET(first_bone), GET(bone_count), GET(bounds_min), GET(bounds_max);
+    GET(material), GET(first_bone), GET(bone_count), GET(target_count);
+    GET(bounds_min), GET(bounds_max);
     rows.push_back(out);
   }
   return rows;

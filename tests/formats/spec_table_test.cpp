@@ -150,8 +150,8 @@ std::map<std::string, Struct> compiled() {
   MODAR_STRUCT(ClipRecord, F(name), F(model), F(tracks), F(seconds), F(error), F(reserved))
   MODAR_STRUCT(JointRecord, F(model), F(parent), F(before), F(translation), F(rotation), F(scale))
   MODAR_STRUCT(BoneRecord, F(joint), F(reserved), F(inverse))
-  MODAR_STRUCT(PartRecord, F(material), F(first_bone), F(bone_count), F(reserved), F(bounds_min),
-               F(bounds_max))
+  MODAR_STRUCT(PartRecord, F(material), F(first_bone), F(bone_count), F(target_count),
+               F(bounds_min), F(bounds_max))
   MODAR_STRUCT(SceneClipRecord, F(scene), F(clip), F(flags), F(reserved))
   MODAR_STRUCT(ClipTracksHeader, F(track_count), F(sample_count), F(reserved))
   MODAR_STRUCT(TrackRecord, F(joint), F(path), F(reserved0), F(key_count), F(keys), F(low), F(step),

@@ -1,6 +1,8 @@
 // Moving models: poses against double precision, and pictures against those of a model whose
 // vertices the test has moved.
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <random>
 
 #include <glm/gtc/matrix_transform.hpp>
@@ -227,6 +229,124 @@ TEST_F(MovingPictureTest, DrawsTwoItemsOfAModelAtTheirOwnTimes) {
   EXPECT_LE(wrong, 40);
   EXPECT_GT(different(together, a), 500);
   EXPECT_GT(different(together, b), 500);
+}
+
+/// The moving model with two morph targets, whose weights are 0.8 and -0.5, or with its vertices
+/// stored where these move them.
+BundleContent morphed_content(bool stored) {
+  constexpr double kFar[] = {0.3, 0.2};
+  constexpr double kWeight[] = {0.8, -0.5};
+  BundleContent content = moving_content();
+  LayoutRecord& layout = content.layouts[0];
+  std::copy_n(layout.attributes + 3, 2, layout.attributes + 2);  // instead of the colour
+  layout.attributes[4] = {};
+  layout.attribute_count = 4;
+  for (int axis = 0; axis < 3 && !stored; ++axis) {
+    layout.attributes[layout.attribute_count++] = {
+        static_cast<std::uint8_t>(8 + axis), 2, 2, 0, static_cast<std::uint16_t>(28 + 4 * axis), 0};
+  }
+  const std::size_t moving = std::size_t{content.levels[0].vertex_count} * layout.stride;
+  std::vector<std::byte> vertices;
+  for (std::size_t v = 0; v < content.vertices.size(); v += layout.stride) {
+    std::array<std::byte, 40> vertex{};
+    std::memcpy(vertex.data(), &content.vertices[v], layout.stride);
+    std::memset(vertex.data() + 16, 0, 4);
+    std::array<float, 3> at{};
+    std::memcpy(at.data(), vertex.data(), sizeof at);
+    const auto y = static_cast<double>(at[1]);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (std::size_t t = 0; t < 2; ++t) {
+        const double phase = static_cast<double>(axis + 2 * t);
+        const auto way = static_cast<std::int16_t>(std::lround(32767 * std::sin(4 * y + phase)));
+        std::memcpy(vertex.data() + 28 + 4 * axis + 2 * t, &way, sizeof way);
+        at[axis] += static_cast<float>(kFar[t] * kWeight[t] * way / 32767);
+      }
+    }
+    if (stored) std::memset(vertex.data() + 28, 0, 12);
+    if (stored && v >= moving) std::memcpy(vertex.data(), at.data(), sizeof at);
+    vertices.insert(vertices.end(), vertex.begin(), vertex.end());
+  }
+  content.vertices = vertices;
+  layout.stride = 40;
+  for (LevelRecord& level : content.levels) level.vertex_offset = level.vertex_offset / 28 * 40;
+  for (ChunkRecord& chunk : content.chunks) {
+    std::fill_n(chunk.bounds_min, 3, -3.0f);
+    std::fill_n(chunk.bounds_max, 3, 3.0f);
+  }
+  if (stored) return content;
+  const auto own = content.bones;
+  for (std::size_t t = 0; t < 2; ++t) {
+    JointRecord joint{};
+    joint.parent = kNone;
+    joint.before[0] = static_cast<float>(kFar[t]);
+    joint.translation[0] = static_cast<float>(kWeight[t]);
+    joint.rotation[3] = 1;
+    BoneRecord bone{};
+    bone.joint = static_cast<std::uint32_t>(content.joints.size());
+    for (int i = 0; i < 3; ++i) bone.inverse[5 * i] = 1;
+    content.joints.push_back(joint);
+    content.bones.insert(content.bones.begin() + 1 + static_cast<std::ptrdiff_t>(t), bone);
+    content.bones.push_back(bone);
+  }
+  content.parts[1].first_bone += 2;
+  for (PartRecord& part : content.parts) part.target_count = 2;
+  return content;
+}
+
+TEST_F(MovingPictureTest, MorphTargetsMoveVerticesBeforeBones) {
+  const MappedBundle moving(morphed_content(false));
+  const MappedBundle still(morphed_content(true));
+  const auto masked = mask_gl_caps(probe_gl_caps(), "mali400");
+  for (const GlCaps& caps : {probe_gl_caps(), *masked}) {
+    for (const float stretch : {1.0f, 1.3f}) {
+      const auto picture = [&](const BundleView& bundle) {
+        ClipPlayer player(bundle, 0);
+        player.play(0, true, 0);
+        player.advance(0.35);
+        player.pose();
+        const auto renderer = make_renderer(bundle, caps);
+        renderer->set_options(flat_light());
+        DrawItem item{0, glm::scale(before_eye(), glm::vec3(stretch, 1.0f, 1.0f)), kNone,
+                      glm::mat4(1.0f)};
+        item.bones = player.bones().data();
+        const auto hit = pick(bundle, camera_above(256), {140, 120}, {&item, 1});
+        return std::pair(draw(*renderer, camera_above(256), {&item, 1}), hit->point);
+      };
+      const auto [found, point] = picture(*moving.view);
+      const auto [expected, wanted] = picture(*still.view);
+      EXPECT_LE(different(found, expected), 10);
+      EXPECT_LT(glm::length(point - wanted), 1e-4f);
+    }
+  }
+}
+
+/// Boxes hold vertices in any pose, that between two clips too: a ray and the frustum find them.
+TEST_F(MovingPictureTest, BoxesHoldPosesOfNoClip) {
+  BundleContent content = moving_content();
+  for (PartRecord& part : content.parts) {
+    std::fill_n(part.bounds_min, 3, -0.01f);  // as if no clip left that
+    std::fill_n(part.bounds_max, 3, 0.01f);
+  }
+  const MappedBundle moving(content);
+  const MappedBundle still(posed_content(bone_matrices(joint_states(0, 0.35))));
+  ClipPlayer player(*moving.view, 0);
+  player.play(0, true, 0);
+  player.advance(0.35);
+  player.pose();
+  DrawItem item{0, before_eye(), kNone, glm::mat4(1.0f)};
+  // The picture shows a part far from the middle alone.
+  for (const float aside : {-0.55f, 0.6f}) {
+    item.to_eye = glm::translate(glm::mat4(1.0f), glm::vec3(-8 * aside, 0, 0)) *
+                  glm::scale(before_eye(), glm::vec3(8.0f));
+    item.bones = nullptr;
+    const auto reference = make_renderer(*still.view, probe_gl_caps());
+    const auto renderer = make_renderer(*moving.view, probe_gl_caps());
+    reference->set_options(flat_light());
+    renderer->set_options(flat_light());
+    const auto expected = draw(*reference, camera_above(256), {&item, 1});
+    item.bones = player.bones().data();
+    EXPECT_LE(different(draw(*renderer, camera_above(256), {&item, 1}), expected), 400);
+  }
 }
 
 /// A ray hits the moving model where it hits the moved one.

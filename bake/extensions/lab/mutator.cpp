@@ -90,6 +90,10 @@ const char* semantic_name(std::uint8_t semantic) {
       return "vertex bones";
     case Semantic::kWeights:
       return "vertex weights";
+    case Semantic::kMorphX:
+    case Semantic::kMorphY:
+    case Semantic::kMorphZ:
+      return "vertex morph";
   }
   return "vertex";
 }

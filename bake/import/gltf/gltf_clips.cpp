@@ -21,6 +21,7 @@ std::optional<TrackPath> path_of(const std::string& word) {
   if (word == "translation") return TrackPath::kTranslation;
   if (word == "rotation") return TrackPath::kRotation;
   if (word == "scale") return TrackPath::kScale;
+  if (word == "weights") return TrackPath::kTranslation;  // of joints that weigh
   return std::nullopt;
 }
 
@@ -37,21 +38,22 @@ bool read_times(const tinygltf::Model& gltf, int index, std::vector<double>& tim
   return true;
 }
 
-bool read_values(const tinygltf::Model& gltf, int index, SourceTrack& track) {
+/// which: of `every` tracks whose values take turns.
+bool read_values(const tinygltf::Model& gltf, int index, std::size_t components, std::size_t which,
+                 std::size_t every, SourceTrack& track) {
   GltfAccessor accessor;
   const bool cubic = track.interpolation == Interpolation::kCubic;
   const bool turns = track.path == TrackPath::kRotation;
-  const std::size_t components = turns ? 4 : 3;
   const std::size_t count = track.times.size() * (cubic ? 3 : 1);
   if (!accessor.open(gltf, index) || accessor.components() != components ||
-      accessor.size() < count) {
+      accessor.size() < count * every) {
     return false;
   }
   for (std::size_t i = 0; i < count; ++i) {
     glm::dvec4 value(0.0);
     for (std::size_t c = 0; c < components; ++c) {
-      value[static_cast<int>(c)] = accessor.at(i, c);
-      if (!std::isfinite(accessor.at(i, c))) return false;
+      value[static_cast<int>(c)] = accessor.at(i * every + which, c);
+      if (!std::isfinite(value[static_cast<int>(c)])) return false;
     }
     const bool tangent = cubic && i % 3 != 1;
     if (turns && !tangent && !(glm::length(value) > 1e-6)) return false;
@@ -60,20 +62,23 @@ bool read_values(const tinygltf::Model& gltf, int index, SourceTrack& track) {
   return true;
 }
 
+/// One track, or one for each morph target.
 Reason read_channel(const tinygltf::Model& gltf, const tinygltf::Animation& animation,
-                    const tinygltf::AnimationChannel& channel, SourceTrack& track) {
+                    const tinygltf::AnimationChannel& channel, std::vector<SourceTrack>& tracks) {
   const auto path = path_of(channel.target_path);
   if (!path)
-    return channel.target_path == "weights"   ? "weights of morph targets"
-           : channel.target_path == "pointer" ? "values that KHR_animation_pointer names"
-                                              : "an unknown target";
+    return channel.target_path == "pointer" ? "values that KHR_animation_pointer names"
+                                            : "an unknown target";
+  SourceTrack track;
   track.path = *path;
   const bool known =
       channel.target_node >= 0 && static_cast<std::size_t>(channel.target_node) < gltf.nodes.size();
   if (!known) return "a target that does not exist";
-  if (gltf.nodes[static_cast<std::size_t>(channel.target_node)].matrix.size() == 16) {
-    return "a node that has a matrix";
-  }
+  const tinygltf::Node& node = gltf.nodes[static_cast<std::size_t>(channel.target_node)];
+  const bool weighs = channel.target_path == "weights";
+  if (!weighs && node.matrix.size() == 16) return "a node that has a matrix";
+  const std::size_t count = weighs ? gltf_targets(gltf, node) : 1;
+  if (count == 0) return "weights of a mesh without morph targets";
   if (channel.sampler < 0 ||
       static_cast<std::size_t>(channel.sampler) >= animation.samplers.size()) {
     return "a sampler that does not exist";
@@ -82,7 +87,12 @@ Reason read_channel(const tinygltf::Model& gltf, const tinygltf::Animation& anim
   if (sampler.interpolation == "STEP") track.interpolation = Interpolation::kStep;
   if (sampler.interpolation == "CUBICSPLINE") track.interpolation = Interpolation::kCubic;
   if (!read_times(gltf, sampler.input, track.times)) return "keys whose times fall";
-  if (!read_values(gltf, sampler.output, track)) return "values that are missing or no numbers";
+  const std::size_t components = weighs ? 1 : track.path == TrackPath::kRotation ? 4 : 3;
+  for (std::size_t t = 0; t < count; ++t) {
+    tracks.push_back(track);
+    if (!read_values(gltf, sampler.output, components, t, count, tracks.back()))
+      return "values that are missing or no numbers";
+  }
   return {};
 }
 
@@ -98,9 +108,8 @@ JointPlace rest_of(const tinygltf::Node& node) {
   return place;
 }
 
-/// Whether a track leaves its node in its place: exporters write one for each bone.
-bool is_still(const SourceTrack& track, const tinygltf::Node& node) {
-  const JointPlace place = rest_of(node);
+/// Whether a track leaves its joint in its place: exporters write one for each bone.
+bool is_still(const SourceTrack& track, const JointPlace& place) {
   glm::dvec4 rest = place.rotation;
   if (track.path == TrackPath::kTranslation) rest = glm::dvec4(place.translation, 0.0);
   if (track.path == TrackPath::kScale) rest = glm::dvec4(place.scale, 0.0);
@@ -147,7 +156,7 @@ class JointFinder {
       const tinygltf::Node& node = gltf_.nodes[n];
       if (moved_[n]) {
         joint_of_[n] = static_cast<std::uint32_t>(clips_.joints.size());
-        clips_.joints.push_back({step.joint, step.before, rest_of(node)});
+        clips_.joints.push_back({step.joint, step.before, rest_of(node), false});
         step = {step.node, joint_of_[n], glm::dmat4(1.0)};
       } else {
         step.before = step.before * node_transform(node);
@@ -168,6 +177,21 @@ class JointFinder {
   GltfClips& clips_;
   std::vector<std::uint32_t> joint_of_;
 };
+
+JointPlace weight_place(const tinygltf::Model& gltf, const tinygltf::Node& node,
+                        std::size_t target) {
+  JointPlace place;
+  place.translation.x = gltf_weight(gltf, node, target);
+  return place;
+}
+
+void add_weight_joints(const tinygltf::Model& gltf, GltfClips& clips) {
+  for (auto& [of, joint] : clips.weights) {
+    const tinygltf::Node& node = gltf.nodes[static_cast<std::size_t>(of.first)];
+    joint = static_cast<std::uint32_t>(clips.joints.size());
+    clips.joints.push_back({kNoJoint, glm::dmat4(1.0), weight_place(gltf, node, of.second), true});
+  }
+}
 
 /// See GltfClips::stored.
 std::vector<glm::dmat4> stored_places(const GltfClips& clips) {
@@ -195,6 +219,7 @@ std::vector<glm::dmat4> stored_places(const GltfClips& clips) {
 
 struct ReadChannel {
   int node;
+  std::optional<std::size_t> target;  ///< that it weighs
   SourceTrack track;
 };
 
@@ -208,17 +233,22 @@ struct ReadAnimation {
 ReadAnimation read_channels(const tinygltf::Model& gltf, const tinygltf::Animation& animation) {
   ReadAnimation result;
   for (const tinygltf::AnimationChannel& channel : animation.channels) {
-    SourceTrack track;
-    const Reason reason = read_channel(gltf, animation, channel, track);
+    std::vector<SourceTrack> tracks;
+    const Reason reason = read_channel(gltf, animation, channel, tracks);
     if (!reason.empty()) {
       if (result.left_out.find(reason) == Reason::npos)
         result.left_out += (result.left_out.empty() ? "" : ", ") + reason;
       continue;
     }
     ++result.read;
-    result.duration = std::max(result.duration, track.times.back());
-    if (is_still(track, gltf.nodes[static_cast<std::size_t>(channel.target_node)])) continue;
-    result.channels.push_back({channel.target_node, std::move(track)});
+    result.duration = std::max(result.duration, tracks[0].times.back());
+    const tinygltf::Node& node = gltf.nodes[static_cast<std::size_t>(channel.target_node)];
+    for (std::size_t t = 0; t < tracks.size(); ++t) {
+      std::optional<std::size_t> target;
+      if (channel.target_path == "weights") target = t;
+      if (is_still(tracks[t], target ? weight_place(gltf, node, t) : rest_of(node))) continue;
+      result.channels.push_back({channel.target_node, target, std::move(tracks[t])});
+    }
   }
   return result;
 }
@@ -228,6 +258,19 @@ std::string name_of(const tinygltf::Animation& animation, std::size_t number) {
 }
 
 }  // namespace
+
+std::size_t gltf_targets(const tinygltf::Model& gltf, const tinygltf::Node& node) {
+  const auto mesh = static_cast<std::size_t>(node.mesh);
+  if (node.mesh < 0 || mesh >= gltf.meshes.size() || gltf.meshes[mesh].primitives.empty()) return 0;
+  return gltf.meshes[mesh].primitives[0].targets.size();
+}
+
+double gltf_weight(const tinygltf::Model& gltf, const tinygltf::Node& node, std::size_t target) {
+  const std::vector<double>& weights =
+      node.weights.empty() ? gltf.meshes[static_cast<std::size_t>(node.mesh)].weights
+                           : node.weights;
+  return target < weights.size() ? weights[target] : 0.0;
+}
 
 GltfClips gltf_clips(const tinygltf::Model& gltf, const std::vector<int>& roots,
                      const std::string& label, std::vector<Diagnostic>& diagnostics) {
@@ -240,7 +283,10 @@ GltfClips gltf_clips(const tinygltf::Model& gltf, const std::vector<int>& roots,
   for (std::size_t i = 0; i < gltf.animations.size(); ++i) {
     animations.push_back(read_channels(gltf, gltf.animations[i]));
     const ReadAnimation& read = animations.back();
-    for (const ReadChannel& each : read.channels) moved[static_cast<std::size_t>(each.node)] = true;
+    for (const ReadChannel& each : read.channels) {
+      if (each.target) result.weights[{each.node, *each.target}] = kNoJoint;
+      if (!each.target) moved[static_cast<std::size_t>(each.node)] = true;
+    }
     if (read.left_out.empty()) continue;
     const std::string name = "animation '" + name_of(gltf.animations[i], i) + "' ";
     if (read.read == 0) {
@@ -251,7 +297,8 @@ GltfClips gltf_clips(const tinygltf::Model& gltf, const std::vector<int>& roots,
            "check the file with the glTF validator and export it again");
     }
   }
-  const auto joints = static_cast<std::size_t>(std::count(moved.begin(), moved.end(), true));
+  const auto joints = result.weights.size() +
+                      static_cast<std::size_t>(std::count(moved.begin(), moved.end(), true));
   // One more may represent what nothing moves.
   if (joints >= kMaxJoints) {
     warn("its animations move " + std::to_string(joints) + " nodes, more than " +
@@ -259,13 +306,16 @@ GltfClips gltf_clips(const tinygltf::Model& gltf, const std::vector<int>& roots,
          "move fewer nodes");
     moved.assign(moved.size(), false);
     animations.clear();
+    result.weights.clear();
   }
   JointFinder finder(gltf, moved, result);
   finder.walk(roots);
+  add_weight_joints(gltf, result);
   for (std::size_t i = 0; i < animations.size(); ++i) {
     SourceClip clip{name_of(gltf.animations[i], i), animations[i].duration, {}};
     for (ReadChannel& each : animations[i].channels) {
-      each.track.joint = finder.joint(each.node);
+      each.track.joint =
+          each.target ? result.weights[{each.node, *each.target}] : finder.joint(each.node);
       if (each.track.joint == kNoJoint) continue;  // in no scene, and nothing of it shows
       clip.tracks.push_back(std::move(each.track));
     }

@@ -158,7 +158,6 @@ class SceneReader {
                                         std::to_string(kMostCopied) + " vertices");
       }
       const tinygltf::Mesh& mesh = gltf_.meshes[static_cast<std::size_t>(node.mesh)];
-      weights_ = node.weights.empty() ? mesh.weights : node.weights;
       for (const auto& primitive : mesh.primitives) {
         MODAR_TRY(add_primitive(primitive, node.skin, to_scene, copy));
       }
@@ -166,9 +165,10 @@ class SceneReader {
     return {};
   }
 
-  /// A morph target with a weight.
+  /// A morph target with a weight, or one that a clip gives it.
   struct Morph {
     double weight = 0;
+    std::uint32_t joint = kNoJoint;
     bool moves = false;
     bool turns = false;
     GltfAccessor positions;
@@ -189,13 +189,15 @@ class SceneReader {
                       accessor.components() >= least_components);
   }
 
-  /// The primitive's targets that have a weight.
   bool open_morphs(const tinygltf::Primitive& primitive, std::size_t count,
                    std::vector<Morph>& morphs) const {
-    for (std::size_t t = 0; t < std::min(weights_.size(), primitive.targets.size()); ++t) {
-      if (weights_[t] == 0) continue;
+    for (std::size_t t = 0; t < primitive.targets.size(); ++t) {
+      const double weight = gltf_weight(gltf_, gltf_.nodes[node_], t);
+      const std::uint32_t joint = parts_.weight_joint(node_, t);
+      if (weight == 0 && joint == kNoJoint) continue;
       Morph& morph = morphs.emplace_back();
-      morph.weight = weights_[t];
+      morph.weight = weight;
+      morph.joint = joint;
       tinygltf::Primitive target;
       target.attributes = primitive.targets[t];
       if (!open(target, "POSITION", count, 3, morph.positions, morph.moves) ||
@@ -213,7 +215,6 @@ class SceneReader {
       ++left_out_.lines_and_points;
       return {};
     }
-    if (!primitive.targets.empty()) ++left_out_.morphs;
     if (primitive.attributes.count("TEXCOORD_1") != 0) ++left_out_.second_uvs;
     const GltfUv placing = gltf_uv(gltf_, primitive.material);
     GltfAccessor positions;
@@ -235,6 +236,8 @@ class SceneReader {
     if (!open_morphs(primitive, positions.size(), morphs)) {
       return wrong("gltf.accessor", "a morph target exceeds its buffer or is invalid");
     }
+    const bool morphing = std::any_of(morphs.begin(), morphs.end(), weighed);
+    if (!primitive.targets.empty() && !morphing) ++left_out_.morphs;
     if (model_.positions.size() + positions.size() >= kNoIndex) {
       return wrong("gltf.read", "it has more vertices than 32 bits count");
     }
@@ -266,15 +269,28 @@ class SceneReader {
       model_.uvs.push_back(has_uvs ? uv_up(placing.apply({uvs.at(v, 0), uvs.at(v, 1)}))
                                    : glm::dvec2(0.0));
       model_.colours.push_back(has_colours ? colour_of(colours, v) : glm::vec3(1.0f));
-    }
-    for (std::size_t v = 0; v < positions.size() && parts_.any(); ++v) {
-      parts_.add_vertex(moves && places->skinned() ? places->shares(v) : std::vector<BoneShare>());
+      if (!parts_.any()) continue;
+      parts_.add_vertex(moves && places->skinned() ? places->shares(v) : std::vector<BoneShare>(),
+                        ways_of(morphs, v, glm::dmat3(*place)));
     }
     any_colours_ = any_colours_ || has_colours;
     if (has_colours && has_alpha(colours, positions.size())) ++left_out_.vertex_alphas;
     begin_material(primitive.material);
-    if (parts_.any()) parts_.begin_faces(model_.corner_positions.size() / 3, group);
+    if (parts_.any())
+      parts_.begin_faces(model_.corner_positions.size() / 3,
+                         moves || !morphing ? group : parts_.of_still());
     return add_triangles(primitive, mode, first, positions.size(), mirrored, has_uvs, has_normals);
+  }
+
+  static bool weighed(const Morph& morph) { return morph.moves && morph.joint != kNoJoint; }
+
+  static std::vector<GltfParts::Way> ways_of(const std::vector<Morph>& morphs, std::size_t v,
+                                             const glm::dmat3& turn) {
+    std::vector<GltfParts::Way> ways;
+    for (const Morph& morph : morphs) {
+      if (weighed(morph)) ways.push_back({morph.joint, turn * vector(morph.positions, v)});
+    }
+    return ways;
   }
 
   /// Where the vertices of what moves are stored.
@@ -375,7 +391,6 @@ class SceneReader {
   GltfParts parts_;
   std::size_t node_ = 0;  // at hand
   bool any_colours_ = false;
-  std::vector<double> weights_;  // of the mesh at hand's morph targets
   LeftOut left_out_;
 };
 

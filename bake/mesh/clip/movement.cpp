@@ -133,6 +133,9 @@ class Measure {
         }
       }
     }
+    for (const SourcePart& part : model_.movement.parts) {
+      for (const std::uint32_t t : part.targets) extremes[t].add(glm::dvec3(0.0));
+    }
     std::vector<JointPoints> result;
     for (std::uint32_t j = 0; j < extremes.size(); ++j) {
       result.push_back({j, extremes[j].points()});
@@ -200,19 +203,32 @@ class Measure {
     for (std::size_t p = 0; p < vertices_.size(); ++p) {
       const std::vector<glm::dmat4> exact = bone_matrices(source, p);
       const std::vector<glm::dmat4> kept = bone_matrices(stored, p);
-      for (const MovedVertex& vertex : moved_[p]) {
+      const std::vector<std::uint32_t>& targets = model_.movement.parts[p].targets;
+      double rounding = 0;  // of ways
+      for (const std::uint32_t t : targets)
+        rounding += std::abs(source[t][3].x) * std::sqrt(0.75) / kMorphUnits;
+      for (std::size_t n = 0; n < moved_[p].size(); ++n) {
+        const MovedVertex& vertex = moved_[p][n];
+        glm::dvec4 from = vertex.at;
+        glm::dvec4 to = vertex.at;
+        for (std::size_t t = 0; t < targets.size(); ++t) {
+          const auto& [x, y, z] = model_.vertex_bones[vertices_[p][n]].morphs;
+          const glm::dvec4 way = glm::dvec4(x[t], y[t], z[t], 0) / double{kMorphUnits};
+          from += source[targets[t]][3].x * way;
+          to += stored[targets[t]][3].x * way;
+        }
         glm::dvec3 wanted(0.0);
         glm::dvec3 found(0.0);
         for (std::size_t k = 0; k < static_cast<std::size_t>(vertex.count); ++k) {
-          wanted += vertex.wanted[k] * glm::dvec3(exact[vertex.bones[k]] * vertex.at);
-          found += vertex.stored[k] * glm::dvec3(kept[vertex.bones[k]] * vertex.at);
+          wanted += vertex.wanted[k] * glm::dvec3(exact[vertex.bones[k]] * from);
+          found += vertex.stored[k] * glm::dvec3(kept[vertex.bones[k]] * to);
         }
         extend(boxes[p], found);
         const glm::dvec3 apart = found - wanted;
-        most = std::max(most, glm::dot(apart, apart));
+        most = std::max(most, glm::length(apart) + rounding);
       }
     }
-    return std::sqrt(most);
+    return most;
   }
 
   const SourceModel& model_;

@@ -223,6 +223,21 @@ constexpr std::array<double, 256> kSnorm8Values = make_snorm8_values();
 
 }  // namespace
 
+namespace {
+
+/// Morph targets that a vertex of the mesh has.
+std::uint8_t targets_of(const TriMesh& mesh) {
+  std::size_t most = 0;
+  for (const VertexBones& bones : mesh.vertex_bones) {
+    for (const auto& axis : bones.morphs) {
+      for (std::size_t t = most; t < axis.size(); ++t) most = axis[t] != 0 ? t + 1 : most;
+    }
+  }
+  return static_cast<std::uint8_t>(most);
+}
+
+}  // namespace
+
 LayoutRecord make_layout(const TriMesh& mesh, PositionKind kind, VertexOffsets& offsets) {
   LayoutRecord layout{};
   const auto add = [&](Semantic semantic, ComponentType type, std::uint8_t components,
@@ -266,6 +281,15 @@ LayoutRecord make_layout(const TriMesh& mesh, PositionKind kind, VertexOffsets& 
     add(Semantic::kWeights, ComponentType::kU8, 4, true,
         static_cast<std::uint16_t>(offsets.bones + 4));
     offsets.stride = static_cast<std::uint16_t>(offsets.stride + 8);
+    offsets.morphs = offsets.stride;
+    offsets.targets = targets_of(mesh);
+    for (std::uint16_t axis = 0; axis < 3 && offsets.targets > 0; ++axis) {
+      const auto semantic = static_cast<std::uint8_t>(Semantic::kMorphX) + axis;
+      add(static_cast<Semantic>(semantic), ComponentType::kI16, offsets.targets, false,
+          offsets.stride);
+      offsets.stride = static_cast<std::uint16_t>(offsets.stride + 2 * offsets.targets);
+    }
+    offsets.stride = static_cast<std::uint16_t>((offsets.stride + 3) & ~3);
   }
   layout.stride = offsets.stride;
   return layout;
@@ -341,6 +365,11 @@ void VertexPacker::pack(const Chunk& chunk, const ChunkGrid& grid, const UvRange
     if (offsets_.bones != 0) {
       std::memcpy(bytes + offsets_.bones, mesh_.vertex_bones[v].bones.data(), 4);
       std::memcpy(bytes + offsets_.bones + 4, mesh_.vertex_bones[v].bytes().data(), 4);
+      const std::size_t words = 2 * std::size_t{offsets_.targets};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        std::memcpy(bytes + offsets_.morphs + axis * words,
+                    mesh_.vertex_bones[v].morphs[axis].data(), words);
+      }
     }
   }
 }

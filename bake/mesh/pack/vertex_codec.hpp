@@ -70,13 +70,15 @@ struct VertexOffsets {
   std::uint16_t colour = 0;
   std::uint16_t occlusion = 0;
   std::uint16_t bones = 0;  ///< weights follow
+  std::uint16_t morphs = 0;
+  std::uint8_t targets = 0;  ///< of them
   std::uint16_t stride = 0;
 };
 
 /// Half floats: 3 halves, 2 bytes of padding, 3 x i8 normal, 1 of occlusion (or padding). 16-bit
 /// integers: the same, or without occlusion 3 of them and an octahedral normal of 2 x i8. Floats: 3
 /// of them, 3 x i8 normal, 1 of occlusion (or padding). Then, where the mesh has them, uv as 2 x
-/// u16, colour as 4 x u8, bones of a part and weights as 4 x u8 each.
+/// u16, colour as 4 x u8, bones of a part and weights as 4 x u8 each, morph targets as 3 x i16.
 LayoutRecord make_layout(const TriMesh& mesh, PositionKind kind, VertexOffsets& offsets);
 
 /// uv = shift + offset + scale * attribute; shift holds whole numbers, which are not stored.

@@ -1,5 +1,5 @@
-// Prints where three.js (npm) has the vertices of a glTF file at 20 times of its first clip:
-//   node three.mjs moving.gltf > moving.txt
+// Prints where three.js (npm) has the vertices of a glTF file at 20 times of a clip:
+//   node three.mjs moving.gltf > moving.txt   (a number behind the file: another clip)
 import fs from 'node:fs';
 import * as THREE from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
@@ -8,7 +8,7 @@ globalThis.self = globalThis;
 globalThis.ProgressEvent ??= class {};
 const gltf = await new GLTFLoader().parseAsync(fs.readFileSync(process.argv[2], 'utf8'), '');
 const mixer = new THREE.AnimationMixer(gltf.scene);
-const clip = gltf.animations[0];
+const clip = gltf.animations[Number(process.argv[3] ?? 0)];
 mixer.clipAction(clip).play();
 for (let step = 0; step < 20; ++step) {
   mixer.setTime(clip.duration * (step + 0.37) / 20);
