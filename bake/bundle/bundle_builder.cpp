@@ -239,9 +239,16 @@ Result<SourceModel> read_moving(const ModelRequest& model, const BakeRequest& re
         fit_movement(source, clip_bound(source, request), request.jobs, source.diagnostics);
   }
   if (movement.fitted.clips.empty()) {
+    const std::size_t clips = request.repair ? source.movement.clips.size() : 0;
     options.clips = false;
     MODAR_ASSIGN(source, read_model(model.path, options));
     source.name = model.name;
+    if (clips != 0) {
+      source.diagnostics.push_back({"model.clips", DiagnosticSeverity::kWarning, model.name, 0,
+                                    "--repair cuts the model in its pose and leaves out " +
+                                        std::to_string(clips) + (clips == 1 ? " clip" : " clips"),
+                                    "bake it without --repair to keep them"});
+    }
     return source;
   }
   source.diagnostics.push_back(clips_found(model.name, movement.fitted));

@@ -471,7 +471,7 @@ std::string scene_words(const BundleView& bundle, std::uint32_t index) {
   }
   char text[48];
   constexpr double kFlat = 0.05;  // mm: a flat sheet has no height
-  if (const double height = scene_height_mm(bundle, scene); height > kFlat) {
+  if (const double height = scene_height_mm(bundle, index); height > kFlat) {
     std::snprintf(text, sizeof text, "%.4g mm high", height);
   } else {
     std::snprintf(text, sizeof text, "scale %.4g", static_cast<double>(scene.scale));
@@ -606,7 +606,7 @@ std::pair<int, int> acting_counts(const BundleView& bundle, std::uint32_t patter
 Json scene_json(const BundleView& bundle, std::uint32_t index) {
   const SceneRecord& scene = bundle.scenes()[index];
   const std::optional<StatedPlacement> placement = stated_placement(bundle, index);
-  const double height = scene_height_mm(bundle, scene);
+  const double height = scene_height_mm(bundle, index);
   const auto [labels, actions] = acting_counts(bundle, scene.pattern);
   return {{"pattern", bundle.name(bundle.patterns()[scene.pattern].name)},
           {"model", bundle.name(bundle.models()[scene.model].name)},

@@ -5,11 +5,14 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
+#include <set>
 #include <sstream>
 
 #include "bake/import/gltf/tinygltf_library.hpp"
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "formats/base/colour.hpp"
+#include "formats/component.hpp"
 #include "formats/texture_format.hpp"
 
 namespace modar {
@@ -37,11 +40,36 @@ class GlbBuilder {
                          double factor, tinygltf::Mesh& mesh);
   int add_view(const void* data, std::size_t size, int target);
   int add_accessor(int view, int type, int component, std::size_t count);
-  int add_floats(const std::vector<float>& values, int type, std::size_t components);
+  int add_floats(const std::vector<float>& values, int type, std::size_t components,
+                 int target = TINYGLTF_TARGET_ARRAY_BUFFER);
+  int add_node(tinygltf::Node node, int parent);
+
+  // What moves.
+  /// The moving part of a material; nullptr: none.
+  [[nodiscard]] const PartRecord* part_of(std::uint32_t material) const;
+  /// The joint that weighs a part's morph target.
+  [[nodiscard]] std::uint32_t weight_of(const PartRecord& part, std::uint32_t target) const {
+    return bundle_.bones()[part.first_bone + part.bone_count + target].joint;
+  }
+  [[nodiscard]] bool weighs(std::uint32_t joint) const;
+  void add_joints(std::uint32_t model, int root);
+  int add_skin(const PartRecord& part);
+  void add_bones(const LayoutRecord& layout, const PartRecord& part, const DecodedLevel& level,
+                 tinygltf::Primitive& primitive);
+  std::vector<float> add_targets(const LayoutRecord& layout, const PartRecord& part,
+                                 const DecodedLevel& level, tinygltf::Primitive& primitive);
+  void add_clips(std::uint32_t model);
+  void add_channel(int node, const char* path, const std::vector<float>& times,
+                   const std::vector<float>& values, int type, std::size_t components,
+                   tinygltf::Animation& animation);
+  void add_weights(const PartRecord& part, int node, const ClipTracksView& view, float step,
+                   std::uint32_t first, tinygltf::Animation& animation);
 
   const BundleView& bundle_;
   tinygltf::Model gltf_;
   std::vector<std::pair<std::uint32_t, int>> textures_;  // of the bundle, of the file
+  std::vector<int> joint_nodes_;                         // of each joint of the bundle
+  std::map<std::uint32_t, int> part_nodes_;  // of the material of each part of the model at hand
 };
 
 int GlbBuilder::add_view(const void* data, std::size_t size, int target) {
@@ -68,9 +96,9 @@ int GlbBuilder::add_accessor(int view, int type, int component, std::size_t coun
   return static_cast<int>(gltf_.accessors.size() - 1);
 }
 
-int GlbBuilder::add_floats(const std::vector<float>& values, int type, std::size_t components) {
-  const int view =
-      add_view(values.data(), values.size() * sizeof(float), TINYGLTF_TARGET_ARRAY_BUFFER);
+int GlbBuilder::add_floats(const std::vector<float>& values, int type, std::size_t components,
+                           int target) {
+  const int view = add_view(values.data(), values.size() * sizeof(float), target);
   return add_accessor(view, type, TINYGLTF_COMPONENT_TYPE_FLOAT, values.size() / components);
 }
 
@@ -142,10 +170,14 @@ Result<void> GlbBuilder::add_chunk(const LayoutRecord& layout, const ChunkRecord
   std::vector<float> colours;
   std::vector<double> least(3, std::numeric_limits<double>::infinity());
   std::vector<double> greatest(3, -std::numeric_limits<double>::infinity());
+  tinygltf::Primitive primitive;
+  const PartRecord* const part = part_of(chunk.material);
+  std::vector<float> still(3 * level.positions.size(), 0.0f);
+  if (part != nullptr) still = add_targets(layout, *part, level, primitive);
   for (std::size_t v = 0; v < level.positions.size(); ++v) {
     for (int i = 0; i < 3; ++i) {
       const auto axis = static_cast<std::size_t>(i);
-      positions.push_back(static_cast<float>(level.positions[v][i] * factor));
+      positions.push_back(static_cast<float>(level.positions[v][i] * factor) + still[3 * v + axis]);
       normals.push_back(static_cast<float>(level.normals[v][i]));
       least[axis] = std::min(least[axis], static_cast<double>(positions.back()));
       greatest[axis] = std::max(greatest[axis], static_cast<double>(positions.back()));
@@ -158,7 +190,7 @@ Result<void> GlbBuilder::add_chunk(const LayoutRecord& layout, const ChunkRecord
     for (int i = 0; i < 3; ++i) colours.push_back(static_cast<float>(linear_of_srgb(c[i])));
     colours.push_back(static_cast<float>(c.a));
   }
-  tinygltf::Primitive primitive;
+  if (part != nullptr) add_bones(layout, *part, level, primitive);
   primitive.mode = TINYGLTF_MODE_TRIANGLES;
   primitive.material = material;
   const int position = add_floats(positions, TINYGLTF_TYPE_VEC3, 3);
@@ -184,19 +216,237 @@ Result<void> GlbBuilder::add_model(std::uint32_t index, std::span<const GlbImage
   add_images(model, images);
   const auto first_material = static_cast<int>(gltf_.materials.size());
   add_materials(model);
-  tinygltf::Mesh mesh;
-  mesh.name = std::string(bundle_.name(model.name));
+  const std::string name(bundle_.name(model.name));
+  std::map<std::uint32_t, tinygltf::Mesh> meshes;  // by material of a part; kNone: of the rest
   for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
     const ChunkRecord& chunk = bundle_.chunks()[model.first_chunk + c];
+    const bool moves = part_of(chunk.material) != nullptr;
     const int material = first_material + static_cast<int>(chunk.material - model.first_material);
-    MODAR_TRY(add_chunk(bundle_.layouts()[model.layout], chunk, material, factor, mesh));
+    tinygltf::Mesh& mesh = meshes[moves ? chunk.material : kNone];
+    mesh.name = name;
+    MODAR_TRY(
+        add_chunk(bundle_.layouts()[model.layout], chunk, material, moves ? 1.0 : factor, mesh));
   }
-  node.name = mesh.name;
-  node.mesh = static_cast<int>(gltf_.meshes.size());
-  gltf_.meshes.push_back(std::move(mesh));
-  gltf_.scenes[0].nodes.push_back(static_cast<int>(gltf_.nodes.size()));
-  gltf_.nodes.push_back(std::move(node));
+  node.name = name;
+  if (meshes.count(kNone) != 0) node.mesh = static_cast<int>(gltf_.meshes.size());
+  if (meshes.count(kNone) != 0) gltf_.meshes.push_back(std::move(meshes[kNone]));
+  meshes.erase(kNone);
+  const int root = add_node(std::move(node), -1);
+  gltf_.scenes[0].nodes.push_back(root);
+  if (meshes.empty()) return {};
+  tinygltf::Node moving;
+  moving.scale = {factor, factor, factor};
+  add_joints(index, add_node(std::move(moving), root));
+  part_nodes_.clear();
+  for (auto& [material, mesh] : meshes) {
+    const PartRecord& part = *part_of(material);
+    for (std::uint32_t t = 0; t < part.target_count; ++t) {
+      const JointRecord& joint = bundle_.joints()[weight_of(part, t)];
+      mesh.weights.push_back(static_cast<double>(joint.translation[0]));
+    }
+    tinygltf::Node skinned;
+    skinned.mesh = static_cast<int>(gltf_.meshes.size());
+    skinned.skin = add_skin(part);
+    gltf_.meshes.push_back(std::move(mesh));
+    part_nodes_[material] = add_node(std::move(skinned), root);
+  }
+  add_clips(index);
   return {};
+}
+
+int GlbBuilder::add_node(tinygltf::Node node, int parent) {
+  const auto index = static_cast<int>(gltf_.nodes.size());
+  gltf_.nodes.push_back(std::move(node));
+  if (parent >= 0) gltf_.nodes[static_cast<std::size_t>(parent)].children.push_back(index);
+  return index;
+}
+
+const PartRecord* GlbBuilder::part_of(std::uint32_t material) const {
+  for (const PartRecord& part : bundle_.moving_parts()) {
+    if (part.material == material) return &part;
+  }
+  return nullptr;
+}
+
+bool GlbBuilder::weighs(std::uint32_t joint) const {
+  for (const PartRecord& part : bundle_.moving_parts()) {
+    for (std::uint32_t t = 0; t < part.target_count; ++t) {
+      if (weight_of(part, t) == joint) return true;
+    }
+  }
+  return false;
+}
+
+/// A node for each joint that weighs no target, below one with the matrix before it.
+void GlbBuilder::add_joints(std::uint32_t model, int root) {
+  joint_nodes_.resize(bundle_.joints().size());
+  for (std::uint32_t j = 0; j < bundle_.joints().size(); ++j) {
+    const JointRecord& joint = bundle_.joints()[j];
+    if (joint.model != model) continue;
+    joint_nodes_[j] = -1;
+    if (weighs(j)) continue;
+    tinygltf::Node before;
+    for (int i = 0; i < 16; ++i) {
+      before.matrix.push_back(i % 4 == 3 ? i / 15
+                                         : static_cast<double>(joint.before[i % 4 * 4 + i / 4]));
+    }
+    tinygltf::Node own;
+    own.name = "joint " + std::to_string(j);
+    own.translation.assign(joint.translation, joint.translation + 3);
+    own.rotation.assign(joint.rotation, joint.rotation + 4);
+    own.scale.assign(joint.scale, joint.scale + 3);
+    const int parent = joint.parent == kNone ? root : joint_nodes_[joint.parent];
+    joint_nodes_[j] = add_node(std::move(own), add_node(std::move(before), parent));
+  }
+}
+
+int GlbBuilder::add_skin(const PartRecord& part) {
+  tinygltf::Skin skin;
+  std::vector<float> inverses;
+  for (std::uint32_t b = part.first_bone; b < part.first_bone + part.bone_count; ++b) {
+    const BoneRecord& bone = bundle_.bones()[b];
+    skin.joints.push_back(joint_nodes_[bone.joint]);
+    for (int i = 0; i < 16; ++i) {
+      inverses.push_back(i % 4 == 3 ? static_cast<float>(i / 15) : bone.inverse[i % 4 * 4 + i / 4]);
+    }
+  }
+  skin.inverseBindMatrices = add_floats(inverses, TINYGLTF_TYPE_MAT4, 16, 0);
+  gltf_.skins.push_back(std::move(skin));
+  return static_cast<int>(gltf_.skins.size() - 1);
+}
+
+void GlbBuilder::add_bones(const LayoutRecord& layout, const PartRecord& part,
+                           const DecodedLevel& level, tinygltf::Primitive& primitive) {
+  const AttributeRecord* joints = find_attribute(layout, Semantic::kJoints);
+  const AttributeRecord* weights = find_attribute(layout, Semantic::kWeights);
+  std::vector<std::uint8_t> bones;
+  std::vector<float> shares;
+  for (const std::byte* vertex : level.vertices) {
+    for (std::uint32_t k = 0; k < 4; ++k) {
+      const double share =
+          part.rigid() ? (k == 0 ? 1.0 : 0.0) : decode_component(*weights, vertex, k);
+      const double bone = part.rigid() || share == 0 ? 0.0 : decode_component(*joints, vertex, k);
+      bones.push_back(static_cast<std::uint8_t>(bone));
+      shares.push_back(static_cast<float>(share));
+    }
+  }
+  primitive.attributes["JOINTS_0"] =
+      add_accessor(add_view(bones.data(), bones.size(), TINYGLTF_TARGET_ARRAY_BUFFER),
+                   TINYGLTF_TYPE_VEC4, TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE, bones.size() / 4);
+  primitive.attributes["WEIGHTS_0"] = add_floats(shares, TINYGLTF_TYPE_VEC4, 4);
+}
+
+/// Adds the primitive's targets; answers how far vertices are from where they are stored while all
+/// weights are 0.
+std::vector<float> GlbBuilder::add_targets(const LayoutRecord& layout, const PartRecord& part,
+                                           const DecodedLevel& level,
+                                           tinygltf::Primitive& primitive) {
+  std::vector<float> still(3 * level.vertices.size(), 0.0f);
+  for (std::uint32_t t = 0; t < part.target_count; ++t) {
+    const JointRecord& joint = bundle_.joints()[weight_of(part, t)];
+    std::vector<float> ways;
+    for (const std::byte* vertex : level.vertices) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto way = static_cast<float>(morph_part(layout, vertex, axis, t));
+        still[ways.size()] += joint.before[3] * way;
+        ways.push_back(joint.before[0] * way);
+      }
+    }
+    primitive.targets.push_back({{"POSITION", add_floats(ways, TINYGLTF_TYPE_VEC3, 3)}});
+    auto& accessor = gltf_.accessors.back();
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      double low = static_cast<double>(ways[axis]);
+      double high = low;
+      for (std::size_t i = axis; i < ways.size(); i += 3) {
+        low = std::min(low, static_cast<double>(ways[i]));
+        high = std::max(high, static_cast<double>(ways[i]));
+      }
+      accessor.minValues.push_back(low);
+      accessor.maxValues.push_back(high);
+    }
+  }
+  return still;
+}
+
+void GlbBuilder::add_channel(int node, const char* path, const std::vector<float>& times,
+                             const std::vector<float>& values, int type, std::size_t components,
+                             tinygltf::Animation& animation) {
+  tinygltf::AnimationSampler sampler;
+  sampler.input = add_floats(times, TINYGLTF_TYPE_SCALAR, 1, 0);
+  gltf_.accessors.back().minValues = {static_cast<double>(times.front())};
+  gltf_.accessors.back().maxValues = {static_cast<double>(times.back())};
+  sampler.output = add_floats(values, type, components, 0);
+  sampler.interpolation = "LINEAR";
+  tinygltf::AnimationChannel channel;
+  channel.sampler = static_cast<int>(animation.samplers.size());
+  channel.target_node = node;
+  channel.target_path = path;
+  animation.samplers.push_back(std::move(sampler));
+  animation.channels.push_back(std::move(channel));
+}
+
+void GlbBuilder::add_clips(std::uint32_t model) {
+  std::uint32_t first = 0;
+  while (bundle_.joints()[first].model != model) ++first;
+  for (const ClipRecord& clip : bundle_.clips()) {
+    if (clip.model != model) continue;
+    ClipTracksView view;
+    const auto joints = static_cast<std::uint32_t>(bundle_.joints().size());
+    const auto bytes = bundle_.section(SectionType::kClipTracks, clip.tracks);
+    if (view_clip_tracks(bytes, joints, view) != nullptr) continue;
+    tinygltf::Animation animation;
+    animation.name = std::string(bundle_.name(clip.name));
+    const float step = clip.seconds / static_cast<float>(view.header->sample_count - 1);
+    for (const TrackRecord& track : view.tracks) {
+      if (joint_nodes_[first + track.joint] < 0) continue;
+      constexpr const char* kPaths[] = {"", "translation", "rotation", "scale"};
+      const std::size_t components =
+          static_cast<TrackPath>(track.path) == TrackPath::kRotation ? 4 : 3;
+      std::vector<float> times;
+      std::vector<float> values;
+      for (std::uint32_t k = 0; k < track.key_count; ++k) {
+        times.push_back(static_cast<float>(view.sample(track, k)) * step);
+        const TrackValue value = view.value(track, k);
+        values.insert(values.end(), value.begin(),
+                      value.begin() + static_cast<std::ptrdiff_t>(components));
+      }
+      add_channel(joint_nodes_[first + track.joint], kPaths[track.path], times, values,
+                  components == 4 ? TINYGLTF_TYPE_VEC4 : TINYGLTF_TYPE_VEC3, components, animation);
+    }
+    for (const auto& [material, node] : part_nodes_) {
+      add_weights(*part_of(material), node, view, step, first, animation);
+    }
+    gltf_.animations.push_back(std::move(animation));
+  }
+}
+
+/// The weights of a part's targets, at the keys of any.
+void GlbBuilder::add_weights(const PartRecord& part, int node, const ClipTracksView& view,
+                             float step, std::uint32_t first, tinygltf::Animation& animation) {
+  std::array<const TrackRecord*, kMostPartTargets> tracks{};
+  std::set<std::uint16_t> samples;
+  for (std::uint32_t t = 0; t < part.target_count; ++t) {
+    for (const TrackRecord& track : view.tracks) {
+      const bool own = first + track.joint == weight_of(part, t) &&
+                       static_cast<TrackPath>(track.path) == TrackPath::kTranslation;
+      if (!own) continue;
+      tracks[t] = &track;
+      for (std::uint32_t k = 0; k < track.key_count; ++k) samples.insert(view.sample(track, k));
+    }
+  }
+  if (samples.empty()) return;
+  std::vector<float> times;
+  std::vector<float> values;
+  for (const std::uint16_t sample : samples) {
+    times.push_back(static_cast<float>(sample) * step);
+    for (std::uint32_t t = 0; t < part.target_count; ++t) {
+      std::uint32_t key = 0;
+      values.push_back(tracks[t] != nullptr
+                           ? view.at(*tracks[t], static_cast<float>(sample), key)[0]
+                           : bundle_.joints()[weight_of(part, t)].translation[0]);
+    }
+  }
+  add_channel(node, "weights", times, values, TINYGLTF_TYPE_SCALAR, 1, animation);
 }
 
 Result<std::vector<std::byte>> GlbBuilder::file() {
@@ -279,6 +529,7 @@ Result<DecodedLevel> decode_level(const BundleView& bundle, const LayoutRecord& 
   for (std::size_t v = 0; v < count; ++v) {
     const std::byte* vertex =
         bundle.vertices().data() + level.vertex_offset + (first + v) * decoder.stride();
+    out.vertices.push_back(vertex);
     out.positions.push_back(decoder.position(vertex, chunk));
     out.normals.push_back(decoder.normal(vertex));
     if (decoder.has(Semantic::kUv)) out.uvs.push_back(decoder.uv(vertex, chunk));

@@ -36,8 +36,9 @@ struct DecodedLevel {
   std::vector<std::uint16_t> indices;
   std::vector<glm::dvec3> positions;  ///< model space, in [-1,1]
   std::vector<glm::dvec3> normals;
-  std::vector<glm::dvec2> uvs;      ///< v down; empty: none
-  std::vector<glm::dvec4> colours;  ///< sRGB; empty: none
+  std::vector<glm::dvec2> uvs;             ///< v down; empty: none
+  std::vector<glm::dvec4> colours;         ///< sRGB; empty: none
+  std::vector<const std::byte*> vertices;  ///< as stored
 };
 /// Errors: kInvalidInput "model.index" where an index exceeds its vertices.
 Result<DecodedLevel> decode_level(const BundleView& bundle, const LayoutRecord& layout,
@@ -59,7 +60,8 @@ double exported_diffuse(const BundleView& bundle, const MaterialRecord& material
 
 /// Level 0 of a model: one primitive a chunk, positions in source units (about the model's
 /// centre, which is the node's translation, so that large coordinates keep their digits in floats),
-/// normals, uv and colours as they decode, materials, textures as PNG.
+/// normals, uv and colours as they decode, materials, textures as PNG. What moves has a skin for
+/// each part and morph targets, and the model's clips are animations.
 /// images: may lack textures; their materials then have their colour alone.
 /// Errors: those of decode_level(); kUnsupported "glb.too-large" beyond 4 GB.
 Result<std::vector<std::byte>> encode_glb(const BundleView& bundle, std::uint32_t model,

@@ -54,6 +54,7 @@ struct SceneSize {
   };
   Kind kind = Kind::kScale;
   double value = 1.0;
+  bool usual = false;  ///< nobody states it: 1, as the model is while its clip begins
 };
 
 /// A shift along the pattern's axes, after everything else.
@@ -74,7 +75,7 @@ inline constexpr const char* kNoClip = "none";
 struct SceneRequest {
   std::string pattern;  ///< names, see name_assets()
   std::string model;
-  SceneSize size;
+  SceneSize size{SceneSize::Kind::kScale, 1.0, true};
   std::optional<UpAxis> up;      ///< points out of the pattern; nothing: as find_up() says
   std::array<double, 3> turn{};  ///< degrees about the pattern's x, y and z, in this order
   bool centred = false;  ///< the model's centre is in the pattern's plane; else its bottom is on it

@@ -286,7 +286,7 @@ class ProjectBake {
     const SceneRequest& request = scene.request;
     std::string text = request.pattern + "\n" + request.model + "\n" +
                        std::string(request.up ? up_axis_name(*request.up) : "") +
-                       (request.centred ? " c" : " s") +
+                       (request.centred ? " c" : " s") + (request.size.usual ? "u" : "") +
                        std::to_string(static_cast<int>(request.size.kind)) +
                        std::to_string(static_cast<int>(request.offset.unit));
     const auto add = [&text](double number) {

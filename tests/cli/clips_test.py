@@ -61,6 +61,38 @@ class Clips(ProgramTest):
                 self.assertEqual(self.scene_clips(bundle), [("wave", 0)])
                 self.assertEqual(self.modar("check", bundle).returncode, 0)
 
+    def test_exports_keep_clips(self):
+        """An extracted GLB bakes to the same clips, on which the second reader agrees."""
+        self.write(json.loads((MOVING.parent / "morphs.gltf").read_text()))
+        self.assertEqual(self.played(), [("linear", 1)])
+        self.assertEqual(self.modar("inspect", "m.modar", "--extract", "out").returncode, 0)
+        glb = (self.folder / "out/m.glb").read_bytes()
+        document = json.loads(glb[20:20 + int.from_bytes(glb[12:16], "little")])
+        self.assertEqual([(each["name"], sorted({channel["target"]["path"] for channel in each["channels"]})) for each in document["animations"]],
+                         [("linear", ["rotation", "weights"]), ("cubic", ["weights"])])
+        self.assertEqual({document["accessors"][each["samplers"][0]["input"]]["max"][0] for each in document["animations"]}, {2})
+        self.assertEqual(self.modar("bake", "out/m.glb", "-o", "again.modar").returncode, 0)
+        self.assertEqual(self.modar("check", "again.modar", "--source", "out/m.glb").returncode, 0)
+        first, again = (self.clips(self.folder / name) for name in ("m.modar", "again.modar"))
+        self.assertEqual([clip[:2] for clip in first], [clip[:2] for clip in again])
+
+    def clips(self, bundle):
+        read = json.loads(subprocess.run([sys.executable, ROOT / "scripts/read_bundle.py", "--json", bundle], capture_output=True, text=True, check=True).stdout)
+        return [(each["name"], each["seconds"]) for each in read["clips"]]
+
+    def test_repair_says_that_it_leaves_them_out(self):
+        done = self.modar("bake", "m.gltf", COVER, "-o", "m.modar", "--repair", *QUICK)
+        self.assertIn("leaves out 2 clips", done.stderr)
+
+    def test_keys_at_time_0_alone_are_a_pose(self):
+        self.document = json.loads((MOVING.parent / "morphs.gltf").read_text())
+        for clip in self.document["animations"]:
+            for sampler in clip["samplers"]:
+                accessor = self.document["accessors"][sampler["input"]]
+                accessor.update(count=1, min=[0], max=[0])
+        self.write(self.document)
+        self.assertEqual(self.played(), [("linear", 0)])
+
     def test_files_that_contradict_themselves_are_findings_or_errors(self):
         def changed(change):
             document = copy.deepcopy(self.document)

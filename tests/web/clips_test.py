@@ -1,4 +1,4 @@
-"""A page plays the clips of a glTF file: their names, their movement, their end."""
+"""A page plays the clips of a glTF file: their names, their movement, their end, and actions that play and stop them."""
 import base64
 import functools
 import http.server
@@ -15,10 +15,39 @@ import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 from browser import CANVAS, Browser, Quiet  # noqa: E402
-from programs import COVER, QUICK, ProgramTest  # noqa: E402
+from programs import COVER, ProgramTest  # noqa: E402
 
 SECONDS = 1.5
-# Draws the model at four times, 250 ms apart: while what the bundle says plays, after stop(), and after a clip that is played once.
+PROJECT = """[project]
+name = "moving"
+[bake]
+loop-views = 8
+score = false
+parameters = "none"
+[[model]]
+file = "moving.gltf"
+[[pattern]]
+file = "cover.png"
+[[pattern]]
+file = "survey.png"
+[[scene]]
+pattern = "cover"
+model = "moving"
+name = "box"
+[[scene.action]]
+on = "tap box"
+do = "stop box"
+[[scene]]
+pattern = "survey"
+model = "moving"
+name = "top"
+clip = "none"
+[[scene.action]]
+on = "tap top"
+do = "play turn on top"
+"""
+# Draws the model at four times, 250 ms apart: while what the bundle says plays, after a tap that stops it, and after a clip that is played
+# once; that of the other picture, which keeps still, before and after a tap that plays it, and after stop().
 LOOK = """(async () => {
   const [{ load }, { View }] = await Promise.all([import('/modar.js'), import('/modar-view.js')]);
   """ + CANVAS + """
@@ -28,10 +57,10 @@ LOOK = """(async () => {
   const seen = { clips: view.clips, ended: [] };
   view.addEventListener('clipend', ({ detail }) => seen.ended.push(detail));
   const from = Float32Array.of(1, 0, 0, 0, 0, 0.5, -0.866, 0, 0, 0.866, 0.5, 0, 0, -0.2, -4, 1);
-  const pictures = async (draws = true) => {
+  const pictures = async (draws = true, pattern = 0) => {
     const all = [];
     for (let i = 0; i < 4; ++i) {
-      if (draws || i === 0) view.drawFrom(0, from, 300);
+      if (draws || i === 0) view.drawFrom(pattern, from, 300);
       const bytes = await (await view.photograph('image/png')).arrayBuffer();
       all.push([...new Uint8Array(await crypto.subtle.digest('SHA-1', bytes))].join());
       await new Promise((done) => setTimeout(done, 250));
@@ -40,12 +69,17 @@ LOOK = """(async () => {
   };
   seen.playing = await pictures();
   seen.alone = await pictures(false);
-  view.stop();
+  view.tap(160, 120);
   seen.stopped = await pictures();
   view.play(view.clips[0].name, { loop: false, blend: 0 });
   const until = performance.now() + 20000;
   while (!seen.ended.length && performance.now() < until) await pictures();
   seen.after = await pictures();
+  seen.still = await pictures(true, 1);
+  view.tap(160, 120);
+  seen.tapped = await pictures(true, 1);
+  view.stop();
+  seen.halted = await pictures(true, 1);
   modar.close();
   return seen;
 })()"""
@@ -77,10 +111,13 @@ class Clips(ProgramTest):
     def test_what_plays_moves_and_what_stopped_stays(self):
         base = pathlib.Path(tempfile.mkdtemp(prefix="modar-clips-"))
         self.addCleanup(shutil.rmtree, base, ignore_errors=True)
-        bundle, site = base / "moving.modar", base / "site"
+        bundle, site = base / "out/moving.modar", base / "site"
         write_turning_box(base / "moving.gltf")
-        for words in (["bake", base / "moving.gltf", COVER, "-o", bundle, "--quiet", *QUICK], ["web", bundle, "-o", site, "--quiet"]):
-            done = self.modar(*words)
+        (base / "modar.toml").write_text(PROJECT)
+        for picture in (COVER, COVER.with_name("survey.png")):
+            shutil.copy(picture, base)
+        for words in (["bake", "--quiet"], ["web", bundle, "-o", site, "--quiet"]):
+            done = self.modar(*words, cwd=base)
             self.assertEqual(done.returncode, 0, done.stderr)
         server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=str(site)))
         threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -97,6 +134,9 @@ class Clips(ProgramTest):
         self.assertEqual([end["name"] for end in seen["ended"]], ["turn"])
         self.assertEqual(len({*seen["after"]}), 1, "its last pose stays")
         self.assertNotEqual(seen["after"][0], seen["stopped"][0])
+        self.assertEqual(len({*seen["still"]}), 1)
+        self.assertEqual(len({*seen["tapped"]}), 4)
+        self.assertEqual(len({*seen["halted"]}), 1)
 
 
 if __name__ == "__main__":

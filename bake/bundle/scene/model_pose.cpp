@@ -1,6 +1,9 @@
 #include "bake/bundle/scene/model_pose.hpp"
 
+#include <algorithm>
+
 #include "bake/mesh/clip/movement.hpp"
+#include "bake/options/request.hpp"
 #include "formats/component.hpp"
 
 namespace modar {
@@ -56,19 +59,26 @@ ModelPose::ModelPose(std::span<const JointRecord> joints, std::span<const BoneRe
   const std::vector<glm::dmat4> matrices = tracks_pose(rest, view, sample, keys);
   for (const PartRecord& part : parts) {
     if (joints[bones[part.first_bone].joint].model != clip.model) continue;
-    for (std::uint32_t b = part.first_bone; b < part.first_bone + part.bone_count; ++b) {
-      bones_[part.material].push_back(matrices[bones[b].joint - first] *
-                                      matrix_of(bones[b].inverse));
+    Part& own = parts_[part.material];
+    const std::uint32_t targets = part.first_bone + part.bone_count;
+    for (std::uint32_t b = part.first_bone; b < targets + part.target_count; ++b) {
+      const glm::dmat4 m = matrices[bones[b].joint - first] * matrix_of(bones[b].inverse);
+      if (b < targets) own.bones.push_back(m);
+      if (b >= targets) own.targets.push_back(m[3].x);
     }
   }
 }
 
 glm::dvec3 ModelPose::place(const LayoutRecord& layout, const VertexDecoder& decoder,
                             const ChunkRecord& chunk, const std::byte* vertex) const {
-  const glm::dvec3 stored = decoder.position(vertex, chunk);
-  const auto found = bones_.find(chunk.material);
-  if (found == bones_.end()) return stored;
-  const std::vector<glm::dmat4>& bones = found->second;
+  glm::dvec3 stored = decoder.position(vertex, chunk);
+  const auto found = parts_.find(chunk.material);
+  if (found == parts_.end()) return stored;
+  const auto& [bones, targets] = found->second;
+  for (std::uint32_t t = 0; t < targets.size(); ++t) {
+    for (int axis = 0; axis < 3; ++axis)
+      stored[axis] += targets[t] * morph_part(layout, vertex, axis, t);
+  }
   if (bones.size() == 1) return glm::dvec3(bones[0] * glm::dvec4(stored, 1.0));
   const std::byte* joints = vertex + find_attribute(layout, Semantic::kJoints)->offset;
   const std::byte* weights = vertex + find_attribute(layout, Semantic::kWeights)->offset;
@@ -82,11 +92,16 @@ glm::dvec3 ModelPose::place(const LayoutRecord& layout, const VertexDecoder& dec
   return at;
 }
 
-std::uint32_t first_clip(const BundleContent& content, std::uint32_t model) {
+std::uint32_t clip_named(const BundleContent& content, std::uint32_t model,
+                         const std::string& name) {
+  std::uint32_t first = kNone;
   for (std::uint32_t c = 0; c < content.clips.size(); ++c) {
-    if (content.clips[c].model == model) return c;
+    if (content.clips[c].model != model) continue;
+    const NameRef& own = content.clips[c].name;
+    if (content.names.compare(own.offset, own.length, name) == 0) return c;
+    first = std::min(first, c);
   }
-  return kNone;
+  return name == kNoClip ? kNone : first;
 }
 
 ModelPose pose_at(const BundleContent& content, std::uint32_t clip, double share) {
@@ -99,13 +114,10 @@ ModelPose pose_at(const BundleContent& content, std::uint32_t clip, double share
           share};
 }
 
-ModelPose first_pose(const BundleContent& content, std::uint32_t model) {
-  return pose_at(content, first_clip(content, model), 0);
-}
-
-ModelPose first_pose(const BundleView& bundle, std::uint32_t model) {
-  for (const ClipRecord& clip : bundle.clips()) {
-    if (clip.model != model) continue;
+ModelPose scene_pose(const BundleView& bundle, std::uint32_t scene) {
+  for (const SceneClipRecord& plays : bundle.scene_clips()) {
+    if (plays.scene != scene) continue;
+    const ClipRecord& clip = bundle.clips()[plays.clip];
     return {copied(bundle.joints()),
             copied(bundle.bones()),
             copied(bundle.moving_parts()),

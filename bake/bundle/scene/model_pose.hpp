@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <glm/mat4x4.hpp>
@@ -28,16 +29,22 @@ class ModelPose {
                                  const ChunkRecord& chunk, const std::byte* vertex) const;
 
  private:
-  std::map<std::uint32_t, std::vector<glm::dmat4>> bones_;  // of each material that moves
+  /// Of each material that moves: its bones, and how far its morph targets move a vertex.
+  struct Part {
+    std::vector<glm::dmat4> bones;
+    std::vector<double> targets;
+  };
+  std::map<std::uint32_t, Part> parts_;
 };
 
-/// The first clip of a model; kNone where it has none.
-std::uint32_t first_clip(const BundleContent& content, std::uint32_t model);
+/// The clip of a model that a scene plays: that of the name, or else the first, but none where the
+/// name is kNoClip. kNone: none.
+std::uint32_t clip_named(const BundleContent& content, std::uint32_t model,
+                         const std::string& name);
 
 /// As stored where clip is kNone.
 ModelPose pose_at(const BundleContent& content, std::uint32_t clip, double share);
-/// Where the first clip of a model begins.
-ModelPose first_pose(const BundleContent& content, std::uint32_t model);
-ModelPose first_pose(const BundleView& bundle, std::uint32_t model);
+/// Where the clip of a scene begins; as stored where it plays none.
+ModelPose scene_pose(const BundleView& bundle, std::uint32_t scene);
 
 }  // namespace modar

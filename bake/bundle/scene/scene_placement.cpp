@@ -19,6 +19,8 @@
 namespace modar {
 namespace {
 
+constexpr double kSameSize = 0.02;  ///< a scale that differs by less stays 1
+
 /// Takes the axis to +z.
 glm::dquat turn_to_z(UpAxis up) {
   const double h = std::sqrt(0.5);
@@ -99,13 +101,15 @@ TurnedBox box_of_vertices(const ModelRecord& model, const LayoutRecord& layout,
   return box;
 }
 
+/// As the scene's clip begins.
 TurnedBox turned_box(const BundleContent& content, const PlacedModel& model,
-                     const glm::dmat3& turn) {
+                     const std::string& clip_name, const glm::dmat3& turn) {
+  const std::uint32_t clip = clip_named(content, model.index, clip_name);
   const double largest = *std::max_element(model.sides.begin(), model.sides.end());
   TurnedBox box;
   if (!(largest > 0)) {
     box.add(glm::dvec3(0.0));
-  } else if (keeps_boxes(turn) && first_clip(content, model.index) == kNone) {
+  } else if (keeps_boxes(turn) && clip == kNone) {
     const glm::dvec3 half(model.sides[0] / largest, model.sides[1] / largest,
                           model.sides[2] / largest);
     glm::dvec3 turned(0.0);
@@ -118,9 +122,17 @@ TurnedBox turned_box(const BundleContent& content, const PlacedModel& model,
   } else {
     const ModelRecord& record = content.models[model.index];
     box = box_of_vertices(record, content.layouts[record.layout], content.chunks, content.levels,
-                          content.vertices, first_pose(content, model.index), turn);
+                          content.vertices, pose_at(content, clip, 0), turn);
   }
   return box;
+}
+
+/// Of the model as its clip begins; without a clip 2.
+glm::dvec3 clip_sides(const BundleContent& content, const PlacedModel& model,
+                      const std::string& clip) {
+  if (clip_named(content, model.index, clip) == kNone) return glm::dvec3(2.0);
+  const TurnedBox box = turned_box(content, model, clip, glm::dmat3(1.0));
+  return box.greatest - box.least;
 }
 
 TurnedBox box_of_mesh(const TriMesh& mesh, const glm::dmat3& turn) {
@@ -193,7 +205,8 @@ Result<SceneRequest> resolve_scene(const SceneRequest& request, const BundleCont
   }
   if (request.size.kind != SceneSize::Kind::kScale) {
     const glm::dmat3 turn = glm::mat3_cast(rotation_of(*resolved.up, request.turn));
-    MODAR_ASSIGN(const double extent, extent_of(request, turned_box(content, model, turn)));
+    MODAR_ASSIGN(const double extent,
+                 extent_of(request, turned_box(content, model, request.clip, turn)));
     resolved.size = {SceneSize::Kind::kScale, request.size.value / unit_mm / extent};
     if (!(resolved.size.value >= kLeastScale && resolved.size.value <= kMostScale)) {
       return scene_error("scene.size", request,
@@ -202,6 +215,12 @@ Result<SceneRequest> resolve_scene(const SceneRequest& request, const BundleCont
                          "compare the length with the printed width of '" + request.pattern +
                              "', and their units");
     }
+  }
+  if (request.size.usual && request.size.kind == SceneSize::Kind::kScale) {
+    const glm::dvec3 sides = clip_sides(content, model, request.clip);
+    const double factor = 2 / std::max({sides.x, sides.y, sides.z});
+    if (std::fabs(factor - 1) > kSameSize && std::isfinite(factor)) resolved.size.value = factor;
+    resolved.size.usual = false;
   }
   const bool in_mm = request.offset.unit == SceneOffset::Unit::kMillimetres ||
                      (request.offset.unit == SceneOffset::Unit::kUsual && unit_mm > 0);
@@ -224,7 +243,8 @@ SceneRecord place_scene(const SceneRequest& resolved, const BundleContent& conte
   std::array<double, 3> offset = resolved.offset.value;
   for (double& value : offset) value *= 2;  // sides to units of the plane
   if (!resolved.centred) {
-    offset[2] -= scale * turned_box(content, model, glm::mat3_cast(rotation)).least.z;
+    offset[2] -=
+        scale * turned_box(content, model, resolved.clip, glm::mat3_cast(rotation)).least.z;
   }
   for (std::size_t i = 0; i < 3; ++i) scene.offset[i] = stored_float(offset[i]);
   scene.rotation[0] = stored_float(rotation.x);
@@ -234,13 +254,14 @@ SceneRecord place_scene(const SceneRequest& resolved, const BundleContent& conte
   return scene;
 }
 
-double scene_height_mm(const BundleView& bundle, const SceneRecord& scene) {
+double scene_height_mm(const BundleView& bundle, std::uint32_t index) {
+  const SceneRecord& scene = bundle.scenes()[index];
   const ModelRecord& model = bundle.models()[scene.model];
   const glm::dquat rotation(scene.rotation[3], scene.rotation[0], scene.rotation[1],
                             scene.rotation[2]);
   const TurnedBox box =
       box_of_vertices(model, bundle.layouts()[model.layout], bundle.chunks(), bundle.levels(),
-                      bundle.vertices(), first_pose(bundle, scene.model), glm::mat3_cast(rotation));
+                      bundle.vertices(), scene_pose(bundle, index), glm::mat3_cast(rotation));
   return static_cast<double>(scene.scale) * (box.greatest.z - box.least.z) *
          millimetres_in_unit(bundle.patterns()[scene.pattern]);
 }

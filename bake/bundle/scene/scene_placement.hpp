@@ -45,8 +45,8 @@ Result<SceneRequest> resolve_scene(const SceneRequest& request, const BundleCont
 SceneRecord place_scene(const SceneRequest& resolved, const BundleContent& content,
                         std::uint32_t pattern, const PlacedModel& model);
 
-/// Millimetres from the lowest to the highest point of a scene's model; 0 where the pattern's width
-/// is unknown. Of the vertices of its finest level.
-double scene_height_mm(const BundleView& bundle, const SceneRecord& scene);
+/// Millimetres from the lowest to the highest point of a scene's model, as its clip begins; 0 where
+/// the pattern's width is unknown. Of the vertices of its finest level.
+double scene_height_mm(const BundleView& bundle, std::uint32_t index);
 
 }  // namespace modar

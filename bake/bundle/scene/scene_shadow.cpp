@@ -266,7 +266,7 @@ std::vector<Casters> poses_of(const BundleContent& content, std::uint32_t scene)
   }
   const SceneRecord& record = content.scenes[scene];
   std::vector<Casters> poses;
-  if (clip == kNone) poses.emplace_back(content, record, first_pose(content, record.model));
+  if (clip == kNone) poses.emplace_back(content, record, ModelPose());
   for (int i = 0; i < kPoses && clip != kNone; ++i) {
     poses.emplace_back(content, record, pose_at(content, clip, (i + 0.5) / kPoses));
   }

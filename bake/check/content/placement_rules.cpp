@@ -61,6 +61,7 @@ std::string place_fault(const BundleView& bundle, const BundleContent& content,
   request.size = {SceneSize::Kind::kScale, *scale};
   request.centred = stated.find("centred").value_or(false).truth().value_or(false);
   request.offset.unit = SceneOffset::Unit::kSide;
+  request.clip = text("clip");
   for (std::size_t i = 0; i < 3; ++i) {
     request.turn[i] = turn.at(i)->number().value_or(0);
     request.offset.value[i] = offset.at(i)->number().value_or(0);
