@@ -100,14 +100,13 @@ inline const AttributeRecord* find_attribute(const LayoutRecord& layout, Semanti
   return nullptr;
 }
 
-/// How far a morph target moves a vertex along an axis, as a part of the farthest way.
+/// How far a morph target of the vertex's part moves it along an axis, as a part of the farthest
+/// way.
 inline double morph_part(const LayoutRecord& layout, const std::byte* vertex, int axis,
                          std::uint32_t target) {
   const int semantic = static_cast<int>(Semantic::kMorphX) + axis;
   const AttributeRecord* attribute = find_attribute(layout, static_cast<Semantic>(semantic));
-  return attribute == nullptr || target >= attribute->components
-             ? 0.0
-             : decode_component(*attribute, vertex, target) / kMorphUnits;
+  return load_number<std::int16_t>(vertex + attribute->offset + 2 * target) / double{kMorphUnits};
 }
 
 }  // namespace modar

@@ -329,21 +329,14 @@ struct Renderer::State {
       const ModelRecord& model = bundle.models()[items[i].model];
       for (std::uint32_t c = model.first_chunk; c < model.first_chunk + model.chunk_count; ++c) {
         const ChunkRecord& chunk = bundle.chunks()[c];
-        const std::uint32_t part = poses ? painter.setups()[c].part : kNone;
-        const bool outside = part == kNone ? outside_frustum(view, chunk)
-                                           : outside_frustum(view, posed(chunk, items[i], part));
+        const bool moves = poses && painter.setups()[c].part != kNone;
+        const bool outside = !moves && outside_frustum(view, chunk);
         if (outside || some_there(chunk)) continue;
         levels.push_back(chunk.first_level + chunk.level_count - 1);
       }
     }
     if (!geometry.fits(levels)) levels.resize(listed);
     geometry.want(levels);
-  }
-
-  ChunkRecord posed(const ChunkRecord& chunk, const DrawItem& item, std::uint32_t part) const {
-    const PartRecord& moving = bundle.moving_parts()[part];
-    const std::uint32_t first = bones_of(bundle, item.model).first;
-    return boxed(chunk, moving, item.bones + (moving.first_bone - first));
   }
 
   bool some_there(const ChunkRecord& chunk) const {

@@ -261,6 +261,18 @@ class Publish(ShipTest):
         self.publish(self.shop.new, options=["--no-expiry"])
         self.assertEqual(self.fetch_json()["expires"], "never")
 
+    def test_clips_travel_and_an_update_takes_what_is_there(self):
+        models = ROOT / "tests/import/clips"
+        first = self.shop.bake("moving", "--model", models / "morphs.gltf", "--model", models / "skinned.gltf")
+        second = self.shop.bake("moved", "--model", models / "morphs.gltf", "--model", models / "skinned.gltf", "--model", models / "moving.gltf")
+        self.publish(first)
+        self.fetch_json()
+        self.assert_installed(first)
+        update = self.publish(second)
+        self.fetch_json()
+        self.assert_installed(second)
+        self.assertLess(update["added_bytes"], update["release"]["bundles"][0]["download_size"])
+
     def test_a_document_without_end_fails_at_once(self):
         self.publish(self.shop.old)
         (self.site / "releases" / "1.json").write_bytes(b" " * (9 << 20))
