@@ -76,7 +76,7 @@ UNTRACKED_TOP_LEVEL = {"build", "out"}
 LIBM = re.compile(r"\b(?:(?:std|glm)::(?:a?sin|a?cos|a?tan2?|exp2?|log(?:2|10)?|pow|hypot|cbrt)f?\(|AngleAxis[df]?\b)")
 # Of C++20, what the C++ library of Debian's emscripten lacks; use formats/base/ranges.hpp. Desks alone build the rest.
 LACKED = re.compile(r"\bstd::(?:ranges::\w+|views::\w+|bit_cast|atomic_ref|make_unique_for_overwrite)")
-DESKS_ALONE = r"formats/base/ranges\.hpp|runtime/(?:play|fetch/curl_).*|(?:bake|runtime)/extensions/(?:lab|studio|python|paper|android)/.*"
+DESKS_ALONE = r"formats/base/ranges\.hpp|runtime/(?:play|fetch/curl_).*|(?:bake|runtime)/extensions/(?:lab|python|paper|android)/.*"
 BANNED_SYMBOLS = ("OpenMesh", "tinygltf", "draco", "2cv", "CLI11", "nlohmann")
 BANNED_LIBRARIES = ("opencv", "OpenMesh", "draco", "tinygltf", "SDL", "assimp", "stdc++")
 

@@ -1,13 +1,14 @@
 // The program `modar`.
 #include <string>
 
+#include "bake/commands/cli.hpp"
 #include "bake/commands/commands.hpp"
 #include "bake/io/terminal.hpp"
 #include "formats/base/leftover.hpp"
 #include "modar/features.hpp"
 #include "modar/mapped_file.hpp"
 
-int main(int argc, char** argv) {
+int modar::run_modar(int argc, char** argv) {
   modar::guard_mapped_files();
   modar::remove_leftovers_at_signals();
   modar::use_baseline_instructions();
@@ -47,4 +48,8 @@ int main(int argc, char** argv) {
     return program.parse_and_run(argc, argv);
   });
   return modar::finish_output(code);
+}
+
+int main(int argc, char** argv) {
+  return modar::run_modar(argc, argv);
 }

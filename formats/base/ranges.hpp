@@ -42,5 +42,11 @@ void sort(Range&& range, Less less = {}, Part part = {}) {
     return less(std::invoke(part, a), std::invoke(part, b));
   });
 }
+template <class Range, class Less, class Part>
+void stable_sort(Range&& range, Less less, Part part) {
+  std::stable_sort(std::begin(range), std::end(range), [&](const auto& a, const auto& b) {
+    return less(std::invoke(part, a), std::invoke(part, b));
+  });
+}
 
 }  // namespace modar::ranges

@@ -9,6 +9,7 @@
 #include "bake/project/project.hpp"
 #include "bake/project/project_edit.hpp"
 #include "formats/base/path.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/base/utf8.hpp"
 
 namespace modar {
@@ -84,13 +85,13 @@ class Edits {
 
   [[nodiscard]] const ProjectAsset* find(const std::string& table, const std::string& name) const {
     const auto& list = assets(table);
-    const auto found = std::ranges::find(list, name, &ProjectAsset::name);
+    const auto found = ranges::find(list, name, &ProjectAsset::name);
     return found == list.end() ? nullptr : &*found;
   }
 
   [[nodiscard]] std::size_t sharing(const std::string& table, std::size_t index) const {
     const auto& list = assets(table);
-    return static_cast<std::size_t>(std::ranges::count(list, index, &ProjectAsset::table));
+    return static_cast<std::size_t>(ranges::count(list, index, &ProjectAsset::table));
   }
 
   [[nodiscard]] std::optional<std::size_t> scene_of(const std::string& pattern,

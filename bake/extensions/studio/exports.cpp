@@ -223,6 +223,8 @@ Result<Export> export_of(Session& session, const std::string& kind, const Json& 
   if (kind == "page" || kind == "zip") {
     made.path = out + "/" + name + "-page";
     made.commands = {web_command(bundle, made.path, body)};
+  } else if (kind == "project") {
+    made.path = out + "/" + name + "-project";
   } else if (kind == "release") {
     // A key is a person's: it is where a backup finds it, and only its owner may read it.
     const std::string key = "keys/" + name + ".key";
@@ -277,6 +279,24 @@ void publish_command_failure(Session& session, const Job& job, const ProcessResu
   session.events.publish("failed", told);
 }
 
+/// What the project is made of, without keys, bundles and names that begin with a dot.
+Result<void> copy_sources(const Session& session, const std::string& out, const std::string& to) {
+  std::error_code error;
+  fs::remove_all(to, error);
+  fs::recursive_directory_iterator it(session.folder, error);
+  for (; !error && it != fs::recursive_directory_iterator(); it.increment(error)) {
+    const std::string name = it->path().lexically_relative(session.folder).string();
+    if (it->path().filename().string().starts_with('.') || name == out || name == "keys") {
+      it.disable_recursion_pending();
+    } else if (it->is_regular_file(error)) {
+      fs::create_directories(fs::path(to + "/" + name).parent_path(), error);
+      if (!fs::copy_file(it->path(), to + "/" + name, error)) break;
+    }
+  }
+  if (!error) return {};
+  return fail(ExitCode::kIo, "io.write", to, error.message(), cure_of_writing(error.value()));
+}
+
 void run_export(Session& session, Job& job, const Export& made) {
   for (const auto& command : made.commands) {
     const ProcessResult ran = job.run(command, session.folder, {});
@@ -285,14 +305,21 @@ void run_export(Session& session, Job& job, const Export& made) {
   }
   std::string path = made.path;
   Json url;
-  if (job.kind == "zip") {
+  if (job.kind == "zip" || job.kind == "project") {
     path += ".zip";
-    if (const auto packed = pack_zip(path_in(session, made.path), path_in(session, path));
-        !packed) {
-      return publish_failure(session, job, packed.error(), Json::array());
-    }
+    const bool whole_project = job.kind == "project";
+    const std::string folder =
+        whole_project ? session.own + "/sources" : path_in(session, made.path);
+    const std::string out = fs::path(path).parent_path().string();
+    const auto packed =
+        (whole_project ? copy_sources(session, out, folder) : Result<void>()).and_then([&] {
+          return pack_zip(folder, path_in(session, path));
+        });
+    std::error_code ignored;
+    if (whole_project) fs::remove_all(folder, ignored);
+    if (!packed) return publish_failure(session, job, packed.error(), Json::array());
   }
-  if (job.kind == "zip" || job.kind == "apk") url = "api/export/" + path;
+  if (job.kind == "zip" || job.kind == "project" || job.kind == "apk") url = "api/export/" + path;
   session.events.publish("exported",
                          {{"job", job.number}, {"kind", job.kind}, {"path", path}, {"url", url}});
 }

@@ -14,6 +14,7 @@
 #include "bake/image/resample.hpp"
 #include "bake/project/project.hpp"
 #include "formats/base/atomic_file.hpp"
+#include "formats/base/ranges.hpp"
 
 namespace modar {
 namespace {
@@ -231,7 +232,7 @@ Result<std::vector<NamedAsset>> nearest_to(Session& session, const NamedAsset& n
     if (!photo) continue;  // its own error is reported where it is shown
     others.emplace_back(likeness(own.pattern.picture, gray_of((*photo)->image)), std::move(other));
   }
-  std::ranges::stable_sort(others, std::greater(), &decltype(others)::value_type::first);
+  ranges::stable_sort(others, std::greater(), &decltype(others)::value_type::first);
   std::vector<NamedAsset> nearest;
   for (std::size_t i = 0; i < std::min(kNearest, others.size()); ++i) {
     nearest.push_back(std::move(others[i].second));

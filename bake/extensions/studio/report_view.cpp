@@ -10,6 +10,7 @@
 #include "bake/extensions/studio/session.hpp"
 #include "bake/io/input.hpp"
 #include "formats/base/atomic_file.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/sections.hpp"
 #include "modar/device_profile.hpp"
@@ -175,7 +176,7 @@ Result<Json> sizes(Session& session) {
   std::uint64_t told = 0;
   for (const Part& part : parts) told += part.bytes;
   parts.push_back({"other", "", whole > told ? whole - told : 0});
-  std::ranges::stable_sort(parts, std::greater(), &Part::bytes);
+  ranges::stable_sort(parts, std::greater(), &Part::bytes);
   Json list = Json::list(parts, [&](const Part& part) -> Json {
     return {{"kind", part.kind},
             {"name", part.name},

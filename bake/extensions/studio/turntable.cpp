@@ -7,6 +7,7 @@
 #include "bake/extensions/studio/exports.hpp"
 #include "bake/extensions/studio/report_view.hpp"
 #include "bake/extensions/studio/session.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/bundle_view.hpp"
 #include "modar/mapped_file.hpp"
 
@@ -86,7 +87,7 @@ Answer get_turntable(Session& session, const Call& call) {
   if (!state) return answer_of(state.error());
   const ProjectDraft draft = read_draft(state->text, session.file);
   const auto& models = draft.project.models;
-  const auto model = std::ranges::find(models, file, &ProjectAsset::file);
+  const auto model = ranges::find(models, file, &ProjectAsset::file);
   if (model == models.end()) return answer_of(unknown_verb(call));
   const AllAround turn{number_in(call, "size", 32, 320), number_in(call, "turn", 1, 16)};
   const auto drawn = strip(session, model->name, turn);

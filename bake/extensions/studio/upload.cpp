@@ -15,11 +15,13 @@
 
 #include "bake/extensions/studio/archive.hpp"
 #include "bake/extensions/studio/edits.hpp"
+#include "bake/extensions/studio/move_file.hpp"
 #include "bake/extensions/studio/path_guard.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/project/project_edit.hpp"
 #include "formats/base/atomic_file.hpp"
 #include "formats/base/path.hpp"
+#include "formats/base/ranges.hpp"
 #include "modar/mapped_file.hpp"
 
 namespace modar {
@@ -71,22 +73,6 @@ void sync(const std::string& path) {
   if (descriptor < 0) return;
   ::fsync(descriptor);
   ::close(descriptor);
-}
-
-/// False, with errno, where the name is taken (EEXIST) or the file cannot be moved.
-bool move_to_free(const std::string& from, const std::string& to) {
-  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return true;
-  if (errno != EINVAL && errno != ENOSYS) return false;
-  // FUSE and network shares cannot do this in one step: an empty file keeps the name free of
-  // others.
-  const int descriptor = ::open(to.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
-  if (descriptor < 0) return false;
-  ::close(descriptor);
-  if (::rename(from.c_str(), to.c_str()) == 0) return true;
-  const int number = errno;
-  ::unlink(to.c_str());
-  errno = number;
-  return false;
 }
 
 /// Gives a file that has arrived its name, or the next one that is free; answers it. Of the same
@@ -160,7 +146,7 @@ Result<std::string> listed_text(const Session& session, const std::string& text,
     const bool plain = pattern.globs.size() == 1 && pattern.globs[0] == as_glob(pattern.file) &&
                        pattern.width_mm == 0 && pattern.shape.text.empty() &&
                        pattern.settings.empty();
-    const bool placed = std::ranges::any_of(draft.project.scenes, [&](const ProjectScene& scene) {
+    const bool placed = ranges::any_of(draft.project.scenes, [&](const ProjectScene& scene) {
       return scene.table && scene.request.pattern == pattern.name;
     });
     if (!plain || placed || is_in(found.pictures, pattern.file)) continue;
@@ -212,7 +198,7 @@ Result<Json> add_upload(Session& session, const std::string& upload, const std::
   });
   if (!listed) problems.push_back(json_of(listed.error()));
   for (const LeftOut& one : found.left_out) {
-    if (std::ranges::count(files, one.file) > 0) problems.push_back(json_of(one.error));
+    if (ranges::count(files, one.file) > 0) problems.push_back(json_of(one.error));
   }
   std::set<std::string> missing;
   for (const std::string& file : files) {
@@ -238,7 +224,7 @@ std::string text_of(const std::string& path, std::size_t most) {
 /// Where a file that a model names is looked for, relative to the project's folder: of one outside
 /// of it, in the model's own folder.
 std::string wanted(const Session& session, const std::string& model, std::string name) {
-  std::ranges::replace(name, '\\', '/');
+  std::replace(name.begin(), name.end(), '\\', '/');
   const fs::path own = fs::path(model).parent_path();
   const fs::path relative = (own / name).lexically_normal().lexically_relative(session.folder);
   if (!relative.empty() && *relative.begin() != "..") return relative.string();

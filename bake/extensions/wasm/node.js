@@ -2,6 +2,8 @@
 mergeInto(LibraryManager.library, {
   eglGetDisplay: function() { return 0; },
   eglCreatePbufferSurface: function() { return 0; },
+  modar_studio_start: function(job, kind) { abort('of a page alone') },
+  modar_studio_end: function() {  },
   modar_node_folder__deps: ['malloc'],
   modar_node_folder: function() { return allocateUTF8(modarPaths.folder); },
   modar_node_run: function(words, variables, output) {

@@ -10,9 +10,13 @@ const m = window.m;
 /** @typedef {import('./parts.js').Shape} Shape */
 /** @typedef {{ name: string, title: string, fits: boolean, findings: Studio.Finding[] }} Device */
 
-const KINDS = ['page', 'zip', 'apk', 'release'];
+/** Of a static page, whose project is in the browser: what can be downloaded. */
+const STATIC = 'modarStatic' in globalThis;
+const KINDS = STATIC ? ['zip', 'project'] : ['page', 'zip', 'apk', 'release'];
 /** Milliseconds between looks at whether the server is still at work. */
 const BUSY_MS = 150;
+/** Milliseconds after which a file that is being saved has been read. */
+const SAVED_MS = 60000;
 /** Parts that are named one by one; the others are one line. */
 const NAMED_PARTS = 6;
 
@@ -35,6 +39,20 @@ function issue({id, text: english, cure: remedy, place}) {
 
 /** In this machine's own program for files. */
 const showFolder = () => ask('POST', 'show', {}).catch(tellError);
+
+/**
+ * Downloads what a link names: browsers do not ask service workers for it.
+ * @param {MouseEvent} event
+ */
+async function save(event) {
+  event.preventDefault();
+  const {href} = /** @type {HTMLAnchorElement} */ (event.currentTarget);
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(await (await fetch(href)).blob());
+  link.download = decodeURIComponent(href.slice(href.lastIndexOf('/') + 1));
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), SAVED_MS);
+}
 
 export class Ship {
   constructor() {
@@ -215,16 +233,19 @@ export class Ship {
             finding({...said(lacks), severity: 'note'}) :
             button(
                 t(`ship.${kind}Make`), () => this.make(kind),
-                {kind: kind === 'page' ? '.primary' : '.quiet', disabled: this.making !== null}),
+                {kind: kind === KINDS[0] ? '.primary' : '.quiet', disabled: this.making !== null}),
         busy && m('p', {role: 'status'}, meter(state.progress?.done ?? 0, t('preparing'))),
         refused && finding({...refused, severity: 'error'}),
         done &&
             m('div.made', {role: 'status'}, icon('check'),
               m('div', m('p', t('made')),
-                m('p', m('code', name(`${state.project.folder}/${done.path}`))),
-                m('p.row', button(t('showFolder'), showFolder, {kind: '.link.small'}),
+                !STATIC && m('p', m('code', name(`${state.project.folder}/${done.path}`))),
+                m('p.row', !STATIC && button(t('showFolder'), showFolder, {kind: '.link.small'}),
                   done.url &&
-                      m('a.small', {href: done.url, target: '_blank', rel: 'noopener'},
+                      m('a.small', {
+                        href: done.url,
+                        ...(STATIC ? {onclick: save} : {target: '_blank', rel: 'noopener'})
+                      },
                         t('download')),
                   kind === 'page' && m('a.small', {href: '#/try'}, t('tryOnPhone'))))));
   }

@@ -219,7 +219,7 @@ export class Try {
                 accept: 'video/*',
                 onchange: (event) => event.target.files?.[0] && this.open(event.target.files[0])
               }))),
-          m('div.wrap', {key: 'phone'}, this.phoneCard())
+          !('modarStatic' in globalThis) && m('div.wrap', {key: 'phone'}, this.phoneCard())
         ]));
   }
 }

@@ -1,0 +1,58 @@
+// @ts-check
+// The service worker of the static studio: requests to `api/` go to the page's worker, all others to the copies of the page's own
+// files, so that the studio opens without a network after the first visit.
+const VERSION = 'MODAR_STUDIO_VERSION';
+/** @type {any} */
+const scope = self;
+
+scope.addEventListener('install', (/** @type {any} */ event) => {
+  event.waitUntil((async () => {
+    const files = await (await fetch('files.json', {cache: 'no-cache'})).json();
+    await (await caches.open(VERSION)).addAll(['./', ...files]);
+    await scope.skipWaiting();
+  })());
+});
+
+scope.addEventListener('activate', (/** @type {any} */ event) => {
+  event.waitUntil((async () => {
+    for (const name of await caches.keys()) {
+      if (name.startsWith('modar-studio ') && name !== VERSION) await caches.delete(name);
+    }
+    await scope.clients.claim();
+  })());
+});
+
+/**
+ * @param {Request} request
+ * @param {string} path below the page's folder
+ * @param {URLSearchParams} query
+ */
+async function ask(request, path, query) {
+  const call = {
+    method: request.method,
+    path,
+    query: Object.fromEntries([...query].reverse()),  // the first of each name
+    body: request.method === 'POST' ? await request.text() : '',
+    upload: request.method === 'PUT' ? await request.blob() : undefined,
+  };
+  // The tab that has the project answers; others do not listen.
+  const tabs = await scope.clients.matchAll({type: 'window'});
+  const {status, type, headers, body} = await new Promise((resolve) => {
+    for (const tab of tabs) {
+      const {port1, port2} = new MessageChannel();
+      port1.onmessage = ({data}) => resolve(data);
+      tab.postMessage({call}, [port2]);
+    }
+  });
+  return new Response(body, {status, headers: {...headers, 'Content-Type': type}});
+}
+
+scope.addEventListener('fetch', (/** @type {any} */ event) => {
+  const url = new URL(event.request.url);
+  const root = new URL('./', scope.location.href).href;
+  if (!url.href.startsWith(root)) return;
+  const path = decodeURIComponent(url.pathname).slice(new URL(root).pathname.length);
+  if (path.startsWith('api/')) return event.respondWith(ask(event.request, path, url.searchParams));
+  if (event.request.method !== 'GET') return;
+  event.respondWith((async () => await caches.match(event.request, {cacheName: VERSION, ignoreSearch: true}) ?? fetch(event.request))());
+});

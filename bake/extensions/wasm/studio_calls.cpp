@@ -1,0 +1,122 @@
+// The studio without a server: a page's worker hands its requests over, and takes answers and events. A job runs in a second
+// instance of the program, in a worker of its own, with a copy of the files.
+#include <emscripten/emscripten.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "bake/extensions/studio/phone.hpp"
+#include "bake/extensions/studio/session.hpp"
+#include "bake/extensions/wasm/studio_job.hpp"
+#include "bake/io/output.hpp"
+
+namespace modar {
+namespace {
+
+struct Studio {
+  explicit Studio(const std::string& folder) : session(folder, MODAR_VERSION) {
+    session.quit = [] {};
+  }
+  Session session;
+  Answer answer;
+  std::string text;  ///< that was returned last
+};
+
+std::unique_ptr<Studio> studio;
+
+const char* returned(const Json& json) {
+  studio->text = json.dump();
+  return studio->text.c_str();
+}
+
+std::string text_in(const Json& json, const char* key) {
+  return json.find(key).value_or("").text().value_or("");
+}
+
+}  // namespace
+
+// ---- what a page of this kind does not have ----
+
+Answer post_phone(Session&) {
+  return answer_of(Error{ExitCode::kUnsupported, "studio.phone", "",
+                         "a page cannot serve the result to a phone",
+                         "download the page as a ZIP file and put it on a web server"});
+}
+
+Answer end_phone(Session&) {
+  return answer_of(Json::object());
+}
+
+void refresh_phone(Session&) {}
+
+}  // namespace modar
+
+// ---- of studio-worker.js ----
+
+/// job: 0 for the instance that answers the page; else the number of the job that this one runs.
+extern "C" EMSCRIPTEN_KEEPALIVE void studio_open(const char* folder, unsigned job) {
+  modar::this_job = job;
+  modar::studio = std::make_unique<modar::Studio>(folder);
+  // Without it nothing can be kept, which the first upload reports.
+  static_cast<void>(modar::make_output_folder(modar::studio->session.own));
+}
+
+/// request: {"method", "path", "query": {name: value}, "body", "upload"}, as in Call. Answers {"status", "type", "headers", "file",
+/// "at", "size"}: the body's place in memory, until the next call, or the path of a file.
+extern "C" EMSCRIPTEN_KEEPALIVE const char* studio_call(const char* request) {
+  using namespace modar;
+  const Json json = Json::parse(request);
+  Call call;
+  call.method = text_in(json, "method");
+  call.path = text_in(json, "path");
+  call.body = text_in(json, "body");
+  call.upload = text_in(json, "upload");
+  const Json query = json.find("query").value_or(Json::object());
+  for (const std::string& name : query.keys()) {
+    call.query.emplace(name, text_in(query, name.c_str()));
+  }
+  studio->answer = answer_call(studio->session, call);
+  const Answer& answer = studio->answer;
+  Json headers = Json::object();
+  for (const auto& [name, value] : answer.headers) headers.set(name, value);
+  return returned({{"status", answer.status},
+                   {"type", answer.type},
+                   {"headers", std::move(headers)},
+                   {"file", answer.file},
+                   {"at", reinterpret_cast<std::uintptr_t>(answer.body.data())},
+                   {"size", answer.body.size()}});
+}
+
+/// The events after that number: [{"number", "name", "data"}]. data: JSON as text.
+extern "C" EMSCRIPTEN_KEEPALIVE const char* studio_events(unsigned after) {
+  using namespace modar;
+  Json list = Json::array();
+  for (const Event& event : studio->session.events.wait(after, std::chrono::milliseconds(0))) {
+    list.push_back({{"number", event.number}, {"name", event.name}, {"data", event.data}});
+  }
+  return returned(list);
+}
+
+/// An event of the instance that runs a job, for the page.
+extern "C" EMSCRIPTEN_KEEPALIVE void studio_publish(const char* name, const char* data) {
+  modar::studio->session.events.publish(name, modar::Json::parse(data));
+}
+
+/// Of the instance that ran the job: what the project had baked when it began.
+extern "C" EMSCRIPTEN_KEEPALIVE const char* studio_baked_scenes() {
+  return modar::returned(modar::studio->session.baked_scenes);
+}
+
+/// The job of the page's instance is over, with these scenes; null: none were baked.
+extern "C" EMSCRIPTEN_KEEPALIVE void studio_job_ended(const char* baked_scenes) {
+  modar::Session& session = modar::studio->session;
+  const modar::Json scenes = modar::Json::parse(baked_scenes);
+  if (!scenes.is_null()) session.baked_scenes = scenes;
+  session.jobs.cancel();
+}
+
+/// A line that the program has printed, on stdout (1) or stderr (2).
+extern "C" EMSCRIPTEN_KEEPALIVE void studio_line(int stream, const char* line) {
+  if (modar::job_line) modar::job_line(stream, line);
+}
