@@ -1,5 +1,6 @@
-// The studio without a server: a page's worker hands its requests over, and takes answers and events. A job runs in a second
-// instance of the program, in a worker of its own, with a copy of the files.
+// The studio without a server: a page's worker hands its requests over, and takes answers and
+// events. A job runs in a second instance of the program, in a worker of its own, with a copy of
+// the files.
 #include <emscripten/emscripten.h>
 
 #include <cstdint>
@@ -62,8 +63,9 @@ extern "C" EMSCRIPTEN_KEEPALIVE void studio_open(const char* folder, unsigned jo
   static_cast<void>(modar::make_output_folder(modar::studio->session.own));
 }
 
-/// request: {"method", "path", "query": {name: value}, "body", "upload"}, as in Call. Answers {"status", "type", "headers", "file",
-/// "at", "size"}: the body's place in memory, until the next call, or the path of a file.
+/// request: {"method", "path", "query": {name: value}, "body", "upload"}, as in Call. Answers
+/// {"status", "type", "headers", "file", "at", "size"}: the body's place in memory, until the next
+/// call, or the path of a file.
 extern "C" EMSCRIPTEN_KEEPALIVE const char* studio_call(const char* request) {
   using namespace modar;
   const Json json = Json::parse(request);

@@ -1,6 +1,6 @@
 // @ts-check
-// Starts the studio of a static page: its worker in the place of the server, and a service worker that brings the page's requests to
-// it. One tab at a time has the project.
+// Starts the studio of a static page: its worker in the place of the server, and a service worker that passes the page's requests
+// on to it. One tab at a time has the project.
 
 /** @param {string} text */
 function say(text) {

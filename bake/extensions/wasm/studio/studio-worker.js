@@ -15,12 +15,13 @@ const JOBS = new Set(['api/bake', 'api/export']);
 let modar;
 /** @type {WebAssembly.Module} */
 let compiled;
-/** Of each file what was stored last: "bytes time". */
+/** The last stored state of each file: "bytes time node". */
 const stored = new Map();
 /** @type {FileSystemDirectoryHandle | null} null: nothing is kept */
 let disk = null;
 let lastEvent = 0;
-/** @type {{number: number, kind: string, worker: Worker | null, ended: boolean} | null} */
+/** @typedef {{number: number, kind: string, worker: Worker | null, ended: boolean}} Job */
+/** @type {Job | null} */
 let job = null;
 /** @type {Promise<unknown>} one call after the other */
 let queue = Promise.resolve();
@@ -50,7 +51,10 @@ async function start(program, jobNumber = 0) {
   modar.FS.mkdirTree(`${PAGE}/bin`);
 }
 
-/** All files below a folder of the module: [path, node]. */
+/**
+ * All files below a folder of the module, with their nodes.
+ * @returns {Generator<[string, any]>}
+ */
 function* files(folder = FOLDER) {
   for (const name of modar.FS.readdir(folder)) {
     if (name === '.' || name === '..') continue;
@@ -133,7 +137,10 @@ async function keep(changed) {
   }
 }
 
-/** @param {FileSystemDirectoryHandle} folder */
+/**
+ * @param {FileSystemDirectoryHandle} folder
+ * @returns {AsyncGenerator<[string, FileSystemFileHandle]>}
+ */
 async function* kept(folder, path = FOLDER) {
   for await (const [name, handle] of /** @type {any} */ (folder).entries()) {
     if (handle.kind === 'directory') yield* kept(handle, `${path}/${name}`);
@@ -160,7 +167,7 @@ async function openDisk() {
 // ---- calls ----
 
 /**
- * @param {Call} call
+ * @param {Omit<Call, 'upload'> & {upload?: string | Blob}} call upload: a path
  * @returns {{status: number, type: string, headers: Record<string, string>, body: Uint8Array}}
  */
 function ask(call) {
@@ -234,7 +241,7 @@ async function loadPage() {
 let isJob = false;
 
 /**
- * @param {NonNullable<typeof job>} mine
+ * @param {Job} mine
  * @param {Call} call
  */
 function startJob(mine, call) {
@@ -257,7 +264,7 @@ function startJob(mine, call) {
 }
 
 /**
- * @param {NonNullable<typeof job>} mine
+ * @param {Job} mine
  * @param {{events: {name: string, data: string}[], files?: Map<string, Uint8Array | null>, ended?: string}} told
  */
 async function jobTold(mine, {events, files: made, ended}) {
@@ -275,7 +282,7 @@ async function jobTold(mine, {events, files: made, ended}) {
 }
 
 /**
- * @param {NonNullable<typeof job>} mine
+ * @param {Job} mine
  * @param {string} cause
  */
 function jobFailed(mine, cause) {
