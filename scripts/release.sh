@@ -3,7 +3,8 @@
 #   scripts/release.sh [--key FILE] [--twice] [--npx] [--out DIR]      (default: out/release)
 #   *.deb                  the Debian packages, clean for lintian, with the page's engine
 #   modar-web-V.tar.gz     the page and its engine, for those who build in place: unpack as build/web
-#   modar-V.tgz            the engine as an npm package; with --npx the program `modar` for Node too (12 CPU-minutes more)
+#   modar-V.tgz            the engine as an npm package; with --npx the program `modar` for Node too (12 CPU-minutes more), and
+#   modar-studio-V.zip     the studio as a static page: unpack it on any web server with HTTPS
 #   modar-V.apk            the app with the demo's bundle, where ANDROID_NDK is set (see scripts/apk.sh)
 #   modar-V-oci.tar        modar and the player on a bare Debian 12 as a container (OCI archive):
 #                          podman run -v "$PWD:/srv" oci-archive:modar-V-oci.tar bake --model vase.obj -o vase.modar
@@ -22,7 +23,7 @@ while [ $# -gt 0 ]; do
     --key | --out) [ $# -ge 2 ] || { echo "release.sh: $1 needs a value" >&2; exit 1; }; printf -v "${1#--}" %s "$2"; shift ;;
     --twice) twice=yes ;;
     --npx) npx=yes ;;
-    -h | --help) sed -n '2,16s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    -h | --help) sed -n '2,17s/^# \{0,1\}//p' "$0"; exit 0 ;;
     *) echo "release.sh: unknown option '$1'; try --help" >&2; exit 1 ;;
   esac
   shift
@@ -59,6 +60,7 @@ build() {  # FOLDER OUT: engine and packages of the checkout in FOLDER, whatever
   if [ $npx = yes ]; then
     npm=$work/npm
     "$tree/scripts/wasm/package.sh" "$npm"
+    "$tree/scripts/wasm/studio.sh" "$work/studio" "$to/modar-studio-$version.zip"
   fi
   npm_files "$npm" >"$work/npm-files"
   packed -C "$npm" --transform 's,^,package/,' -T "$work/npm-files" >"$to/modar-$version.tgz"

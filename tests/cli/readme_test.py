@@ -54,7 +54,7 @@ RUN_ELSEWHERE = (
 # Measurements that take minutes: no gate runs them.
 LONG_BENCHES = (
     (r"^modar-lab bench (extended|clutter|model) ", "minutes"),
-    (r"tests/bench/media_page\.py", "minutes"),
+    (r"tests/bench/media_page\.py|cluster_levels\.mjs", "minutes"),
 )
 # They run until Ctrl-C.
 SERVES = re.compile(r"^modar web .*--serve\b")
