@@ -256,21 +256,6 @@ Result<SourceModel> read_moving(const ModelRequest& model, const BakeRequest& re
   return source;
 }
 
-/// Out of the pattern in a model's coordinates; zero where its scenes differ.
-glm::dvec3 viewer_of(std::size_t model, UpAxis up, const std::vector<KnownScene>& scenes) {
-  const auto out = [](UpAxis axis, const std::array<double, 3>& turn) {
-    return glm::inverse(rotation_of(axis, turn)) * glm::dvec3(0, 0, 1);
-  };
-  std::optional<glm::dvec3> all;
-  for (const KnownScene& known : scenes) {
-    if (known.model != model) continue;
-    const glm::dvec3 own = out(known.scene.up.value_or(up), known.scene.turn);
-    if (all && glm::dot(*all, own) < 0.999) return glm::dvec3(0.0);
-    all = own;
-  }
-  return all.value_or(out(up, {}));
-}
-
 /// Sides of its pattern from which on a model's offset is taken for a slip.
 constexpr double kFarSides = 10;
 
@@ -303,8 +288,7 @@ void draw_backs(TriMesh& mesh, const std::vector<bool>& backs, Report& report) {
 }
 
 Result<WeldedModel> read_and_weld(std::size_t number, const BakeRequest& request,
-                                  const std::vector<KnownScene>& scenes, TextureUses& textures,
-                                  Report& report, BakeTrace& trace) {
+                                  TextureUses& textures, Report& report, BakeTrace& trace) {
   const ModelRequest& model = request.models[number];
   StageTimer reading(report, "read");
   ModelMovement movement;
@@ -323,7 +307,9 @@ Result<WeldedModel> read_and_weld(std::size_t number, const BakeRequest& request
     return tl::unexpected(mesh.error());
   }
   report.uprights.push_back(request.up ? Upright{*request.up, UpReason::kAsked} : find_up(*mesh));
-  const glm::dvec3 viewer = viewer_of(number, report.uprights.back().axis, scenes);
+  // Out of the pattern, as the model stands by itself: a project bakes it without its scenes.
+  const glm::dvec3 viewer =
+      glm::inverse(rotation_of(report.uprights.back().axis, {})) * glm::dvec3(0, 0, 1);
   report.defects.push_back(count_defects(*mesh, request.repairs(), viewer, report));
   draw_backs(*mesh, report.defects.back().backs, report);
   if (request.topology) {
@@ -506,7 +492,7 @@ Result<void> add_models(const BakeRequest& request, const std::vector<KnownScene
   TextureUses textures;
   std::vector<WeldedModel> models;
   for (std::size_t m = 0; m < request.models.size(); ++m) {
-    Result<WeldedModel> welded = read_and_weld(m, request, scenes, textures, report, trace);
+    Result<WeldedModel> welded = read_and_weld(m, request, textures, report, trace);
     if (!welded) return tl::unexpected(welded.error());
     for (const KnownScene& known : scenes) {
       if (known.model != models.size()) continue;

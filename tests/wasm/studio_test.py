@@ -99,6 +99,8 @@ class StaticStudio(unittest.TestCase):
         self.drop("patterns/cover.png")
         self.browser.wait("fetch('api/project').then((answer) => answer.json()).then(({patterns}) => patterns.length === 1)", "the picture")
         before = self.project()
+        self.browser.wait("fetch('files.json').then((answer) => answer.json()).then((names) => Promise.all(names.map((name) => caches.match(name))))"
+                          ".then((found) => found.every(Boolean))", "the copies of all files")
         self.server.close()
         self.browser.open("about:blank")
         self.browser.open(self.server.url)

@@ -49,6 +49,22 @@ async function openServiceWorker() {
   await new Promise((resolve) => { navigator.serviceWorker.addEventListener('controllerchange', resolve, {once: true}); });
 }
 
+/** The program, and on the page how much of it has come. */
+async function loadProgram() {
+  const response = await fetch('baker/baker.wasm');
+  if (!response.ok || !response.body) throw new Error(`baker/baker.wasm: the server answered ${response.status}`);
+  const reader = response.body.getReader();
+  /** @type {Uint8Array[]} */
+  const parts = [];
+  let bytes = 0;
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    parts.push(part.value);
+    bytes += part.value.length;
+    say(`The studio is loading, once: ${(bytes / 1e6).toFixed(1)} of 13 MB`);
+  }
+  return new Blob(parts).arrayBuffer();
+}
+
 /** @returns {Promise<boolean>} whether it keeps files */
 async function openWorker() {
   const worker = new Worker(new URL('./studio-worker.js', import.meta.url), {type: 'module'});
@@ -61,8 +77,7 @@ async function openWorker() {
     worker.postMessage({id: last, call: data.call});
   });
   navigator.serviceWorker.startMessages();
-  const program = WebAssembly.compile(await (await fetch('baker/baker.wasm')).arrayBuffer());
-  worker.postMessage({program: await program});
+  worker.postMessage({program: await WebAssembly.compile(await loadProgram())});
   return new Promise((resolve, reject) => {
     worker.onmessage = ({data}) => {
       if (data.ready) resolve(data.kept);
@@ -85,6 +100,7 @@ async function begin() {
     await navigator.storage?.persist?.();
     Object.assign(globalThis, {EventSource: WorkerEvents, modarStatic: {kept}});
     await import(new URL('./app.js', import.meta.url).href);
+    navigator.serviceWorker.controller?.postMessage({keep: true});
     if (!kept) console.info(CAUSES.memory);
   } catch (error) {
     say(error instanceof DOMException && error.name === 'SecurityError' ? CAUSES.browser : `The studio cannot start: ${error}`);

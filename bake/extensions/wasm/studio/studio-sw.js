@@ -5,12 +5,25 @@ const VERSION = 'MODAR_STUDIO_VERSION';
 /** @type {any} */
 const scope = self;
 
+/**
+ * Keeps copies of the page's files, which the page waits for, or of all.
+ * @param {boolean} all
+ */
+async function keep(all) {
+  const cache = await caches.open(VERSION);
+  const names = ['./', ...await (await fetch('files.json', {cache: 'no-cache'})).json()];
+  for (const name of names) {
+    if (!all && /^(baker|engine)\//.test(name)) continue;
+    if (!await cache.match(name)) await cache.add(name);
+  }
+}
+
 scope.addEventListener('install', (/** @type {any} */ event) => {
-  event.waitUntil((async () => {
-    const files = await (await fetch('files.json', {cache: 'no-cache'})).json();
-    await (await caches.open(VERSION)).addAll(['./', ...files]);
-    await scope.skipWaiting();
-  })());
+  event.waitUntil(keep(false).then(() => scope.skipWaiting()));
+});
+
+scope.addEventListener('message', (/** @type {any} */ event) => {
+  if (event.data.keep) event.waitUntil(keep(true));
 });
 
 scope.addEventListener('activate', (/** @type {any} */ event) => {
