@@ -287,9 +287,8 @@ void draw_backs(TriMesh& mesh, const std::vector<bool>& backs, Report& report) {
        ""});
 }
 
-Result<WeldedModel> read_and_weld(std::size_t number, const BakeRequest& request,
+Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& request,
                                   TextureUses& textures, Report& report, BakeTrace& trace) {
-  const ModelRequest& model = request.models[number];
   StageTimer reading(report, "read");
   ModelMovement movement;
   Result<SourceModel> source = read_moving(model, request, movement);
@@ -491,8 +490,8 @@ Result<void> add_models(const BakeRequest& request, const std::vector<KnownScene
                         BundleContent& content, Report& report, BakeTrace& trace) {
   TextureUses textures;
   std::vector<WeldedModel> models;
-  for (std::size_t m = 0; m < request.models.size(); ++m) {
-    Result<WeldedModel> welded = read_and_weld(m, request, textures, report, trace);
+  for (const ModelRequest& model : request.models) {
+    Result<WeldedModel> welded = read_and_weld(model, request, textures, report, trace);
     if (!welded) return tl::unexpected(welded.error());
     for (const KnownScene& known : scenes) {
       if (known.model != models.size()) continue;

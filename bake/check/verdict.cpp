@@ -100,8 +100,7 @@ constexpr IssueKind kKinds[] = {
      "`modar pattern score` names the cause; choose another picture"},
     {"MODEL_UNSEEN", Severity::kWarning,
      "Nothing of a model is drawn for those who look at its pattern: it shows them backs of "
-     "one-sided "
-     "materials, or is transparent",
+     "one-sided materials, or is transparent",
      "turn it (turn=180:0:0), or make its materials two-sided or opaque"},
 };
 static_assert(std::size(kKinds) == static_cast<std::size_t>(WorkstationRule::kCount));

@@ -46,7 +46,8 @@ bool named_as_file(const std::string& path) {
   const std::size_t dot = path.rfind('.');
   if (dot == std::string::npos || dot == 0 || path[dot - 1] == '/') return false;
   const std::string_view ending = std::string_view(path).substr(dot + 1);
-  if (ending.size() < 2 || ending.size() > 4 || std::isdigit(ending[0]) != 0) return false;
+  if (ending.size() < 2 || ending.size() > 4) return false;
+  if (std::isdigit(static_cast<unsigned char>(ending[0])) != 0) return false;
   for (const char c : ending) {
     if (std::isalnum(static_cast<unsigned char>(c)) == 0) return false;
   }

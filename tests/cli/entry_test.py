@@ -195,7 +195,7 @@ class WrongFiles(ProgramTest):
 
     def test_what_is_wrong_with_a_model_is_named(self):
         corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
-        (self.folder / "beyond.obj").write_text(corners + "f 1 2 9\nf 1 2 7\n")
+        (self.folder / "beyond.obj").write_text("quad 1\n" + corners + "f 1 2 9\nf 1 2 7\n")
         self.assert_fails(self.modar("bake", "beyond.obj", "-o", "o.modar"), 3, "none of its 2 faces can be used: ", "refer to vertices that do not exist")
         (self.folder / "plain.obj").write_text("mtllib odd.mtl\nusemtl a\n" + corners + "f 1 2 3\n")
         (self.folder / "odd.mtl").write_bytes(b"newmtl a\n\0\1\2")

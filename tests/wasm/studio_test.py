@@ -127,6 +127,23 @@ class StaticStudio(unittest.TestCase):
         self.assertEqual(told["code"], "studio.name")
         self.assertNotEqual(told["cure"], "")
 
+    def test_work_that_breaks_off_is_told_and_ends(self):
+        # The job's worker alone gets a message with a job: there the program cannot start.
+        worker = self.base / "modar-studio/studio-worker.js"
+        worker.write_text(worker.read_text().replace("isJob = true;", "isJob = true;\n  throw new RangeError('out of memory');", 1))
+        page = self.base / "modar-studio/engine/files.json"
+        page.rename(page.with_suffix(".away"))
+        self.browser = self.start("other")
+        self.browser.run("(globalThis.told = new Promise((resolve) => new EventSource('').addEventListener('failed', ({data}) => resolve(data))), true)")
+        self.drop(*FILES)
+        failure = json.loads(self.browser.run("told"))
+        self.assertEqual((failure["code"], "out of memory" in failure["error"]), ("studio.memory", True), failure)
+        self.assertFalse(self.project()["baking"])
+        # A site is made of the page's files, one of which the server does not have.
+        refused = json.loads(self.browser.run("fetch('api/export', {method: 'POST', body: '{\"kind\": \"zip\"}'}).then((answer) => answer.text())"))
+        self.assertEqual((refused["code"], refused["error"], refused["cure"]),
+                         ("studio.page", "engine/files.json: the server answered 404", "try again"))
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -435,6 +435,17 @@ Result<std::optional<ObjCounts>> parse_once(const ByteSource& source, const Mode
   return std::nullopt;
 }
 
+/// ": " and what faces are lost by; empty where no note says it.
+std::string loss_of(const SourceModel& model) {
+  for (const Diagnostic& note : model.diagnostics) {
+    for (const char* id : {"obj.index-range", "obj.zero-index", "obj.no-position", "obj.short-face",
+                           "obj.bad-number", "obj.not-finite"}) {
+      if (note.id == id) return ": " + note.message;
+    }
+  }
+  return {};
+}
+
 Result<SourceModel> parse_source(const ByteSource& source, const ModelFolder& folder,
                                  const std::string& stem, const std::string& label,
                                  const ReadOptions& options) {
@@ -456,10 +467,9 @@ Result<SourceModel> parse_source(const ByteSource& source, const ModelFolder& fo
     MODAR_TRY(parse_once(source, folder, label, {1, options.own_picture}, &*bad, model));
   }
   if (model.face_count() == 0 && model.lost_faces > 0) {
-    const Diagnostic& why = model.diagnostics.front();
     return fail(
         ExitCode::kInvalidInput, "obj.no-faces", label,
-        "none of its " + std::to_string(model.lost_faces) + " faces can be used: " + why.message,
+        "none of its " + std::to_string(model.lost_faces) + " faces can be used" + loss_of(model),
         "export the model again");
   }
   if (model.face_count() == 0) {

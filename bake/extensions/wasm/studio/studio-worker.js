@@ -176,17 +176,19 @@ function ask(call) {
   return {status, type, headers, body};
 }
 
+const ROOM = {
+  error: 'the browser gives this page no more room',
+  cure: 'free space on this device, or export the project and remove files from it',
+  code: 'studio.room',
+};
+
 /** @param {unknown} error */
-const failed = (error) => ({
-  status: 507,
-  type: 'application/json',
-  headers: {},
-  body: new TextEncoder().encode(JSON.stringify({
-    error: error instanceof Error && error.name === 'QuotaExceededError' ? 'the browser gives this page no more room' : String(error),
-    cure: 'free space on this device, or export the project and remove files from it',
-    code: 'studio.room',
-  })),
-});
+function failed(error) {
+  const full = error instanceof Error && error.name === 'QuotaExceededError';
+  const told = full ? ROOM : {error: error instanceof Error ? error.message : String(error), cure: 'try again', code: 'studio.page'};
+  const body = new TextEncoder().encode(JSON.stringify(told));
+  return {status: full ? 507 : 500, type: 'application/json', headers: {}, body};
+}
 
 /** @param {Call} call */
 async function answer(call) {
@@ -227,11 +229,14 @@ function sendEvents() {
 /** What `modar web` copies into a site: the page, fetched once. */
 async function loadPage() {
   if (pageLoaded) return;
-  const list = await (await fetch('engine/files.json')).json();
-  await Promise.all(list.map(async (/** @type {string} */ name) => {
+  const get = async (/** @type {string} */ name) => {
     const response = await fetch(`engine/${name}`);
     if (!response.ok) throw new Error(`engine/${name}: the server answered ${response.status}`);
-    putFiles([[`${PAGE}/${name}`, new Uint8Array(await response.arrayBuffer())]]);
+    return response;
+  };
+  const list = await (await get('files.json')).json();
+  await Promise.all(list.map(async (/** @type {string} */ name) => {
+    putFiles([[`${PAGE}/${name}`, new Uint8Array(await (await get(name)).arrayBuffer())]]);
   }));
   pageLoaded = true;
 }
@@ -265,10 +270,11 @@ function startJob(mine, call) {
 
 /**
  * @param {Job} mine
- * @param {{events: {name: string, data: string}[], files?: Map<string, Uint8Array | null>, ended?: string}} told
+ * @param {{events: {name: string, data: string}[], files?: Map<string, Uint8Array | null>, ended?: string, broken?: string}} told
  */
-async function jobTold(mine, {events, files: made, ended}) {
+async function jobTold(mine, {events, files: made, ended, broken}) {
   if (job !== mine) return;
+  if (broken !== undefined) return jobFailed(mine, broken);
   if (made) {
     putFiles(made);
     await keep(changes());
@@ -335,7 +341,7 @@ async function beginPage(program) {
 
 self.onmessage = ({data}) => {
   if (data.job) {
-    beginJob(data).catch((error) => { throw error; });
+    beginJob(data).catch((error) => self.postMessage({events: [], broken: String(error)}));
   } else if (data.program) {
     queue = beginPage(data.program).catch((error) => self.postMessage({error: String(error)}));
   } else {
