@@ -664,6 +664,7 @@ Result<BundleContent> build_bundle(const BakeRequest& request, Report& report, B
   }
   MODAR_TRY(add_scene_clips(named.scenes, content));
   MODAR_TRY(add_nodes(named, content, report));
+  for (Diagnostic& doubt : doubtful_scenes(content)) report.diagnostics.push_back(std::move(doubt));
   MODAR_TRY(light_scenes(named.scenes, named, content, report));
   content.meta = bundle_meta(named, report, traced);
   finish_content(content);

@@ -2,12 +2,10 @@
 #include "bake/check/verdict.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <iterator>
 
-#include <glm/gtc/quaternion.hpp>
-
+#include "bake/bundle/scene/scene_placement.hpp"
 #include "bake/check/device/device_rules.hpp"
 #include "bake/check/yml_rule.hpp"
 #include "formats/bundle_view.hpp"
@@ -192,20 +190,6 @@ void report_preview(const BundleView& bundle, const IssueSink& sink) {
         std::nullopt});
 }
 
-/// Cosine of the angle from which on a normal is turned away from those who look at a pattern.
-constexpr float kTurnedAway = -0.87f;
-
-/// Opacity below which nothing shows.
-constexpr float kUnseen = 0.004f;
-
-/// Whether all normals of a chunk are turned away from who looks along -z. turn: of its model.
-bool turned_away(const ChunkRecord& chunk, const glm::quat& turn) {
-  if (!(chunk.cone_cutoff <= 1.0f)) return false;
-  const glm::vec3 axis(chunk.cone_axis[0], chunk.cone_axis[1], chunk.cone_axis[2]);
-  const float spread = std::asin(chunk.cone_cutoff);
-  return std::acos(std::clamp((turn * axis).z, -1.0f, 1.0f)) - spread > std::acos(kTurnedAway);
-}
-
 void report_unseen(const BundleView& bundle, const IssueSink& sink) {
   const auto tell = [&](WorkstationRule rule, const void* place, const char* what, NameRef name) {
     const auto at = static_cast<const std::byte*>(place) - bundle.bytes().data();
@@ -218,16 +202,9 @@ void report_unseen(const BundleView& bundle, const IssueSink& sink) {
   }
   for (const SceneRecord& scene : bundle.scenes()) {
     const ModelRecord& model = bundle.models()[scene.model];
-    const glm::quat turn(scene.rotation[3], scene.rotation[0], scene.rotation[1],
-                         scene.rotation[2]);
-    bool unseen = model.chunk_count > 0;
-    for (std::uint32_t c = model.first_chunk; c < model.first_chunk + model.chunk_count; ++c) {
-      const ChunkRecord& chunk = bundle.chunks()[c];
-      const MaterialRecord& material = bundle.materials()[chunk.material];
-      const bool two_sided = (material.flags & kMaterialTwoSided) != 0;
-      unseen = unseen && (material.opacity < kUnseen || (!two_sided && turned_away(chunk, turn)));
+    if (draws_nothing(scene, model, bundle.chunks(), bundle.materials())) {
+      tell(WorkstationRule::kModelUnseen, &scene, "model", model.name);
     }
-    if (unseen) tell(WorkstationRule::kModelUnseen, &scene, "model", model.name);
   }
 }
 

@@ -557,6 +557,7 @@ class ProjectBake {
     MODAR_TRY(hold_gates(target, content));
     note_budget(target, described, content);
     for (Diagnostic& alike : alike_patterns(content)) notes_.push_back(std::move(alike));
+    for (Diagnostic& doubt : doubtful_scenes(content)) notes_.push_back(std::move(doubt));
     for (Diagnostic& hidden : never_shown(content)) notes_.push_back(std::move(hidden));
     return write(target, content);
   }

@@ -3,6 +3,7 @@
 #include "bake/bundle/scene/model_pose.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <span>
 
@@ -14,6 +15,7 @@
 #include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/mesh/upright.hpp"
 #include "bake/options/request_text.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/rules.hpp"
 
 namespace modar {
@@ -252,6 +254,38 @@ SceneRecord place_scene(const SceneRequest& resolved, const BundleContent& conte
   scene.rotation[2] = stored_float(rotation.z);
   scene.rotation[3] = stored_float(rotation.w);
   return scene;
+}
+
+std::vector<Diagnostic> doubtful_scenes(const BundleContent& content) {
+  std::vector<Diagnostic> found;
+  const auto name_of = [&](NameRef name) { return content.names.substr(name.offset, name.length); };
+  const auto bytes_of = [](const SceneRecord& scene) {
+    return std::bit_cast<std::array<std::byte, sizeof(SceneRecord)>>(scene);
+  };
+  const auto doubt = [&](const char* code, const SceneRecord& scene, const char* cause,
+                         const char* cure) {
+    const std::string file = name_of(content.patterns[scene.pattern].name) + "=" +
+                             name_of(content.models[scene.model].name);
+    found.push_back({code, DiagnosticSeverity::kWarning, file, 0, cause, cure});
+  };
+  for (std::size_t i = 0; i < content.scenes.size(); ++i) {
+    const SceneRecord& scene = content.scenes[i];
+    const ModelRecord& model = content.models[scene.model];
+    if (draws_nothing(scene, model, content.chunks, content.materials)) {
+      doubt("scene.unseen", scene,
+            "nothing of the model is drawn for those who look at its pattern",
+            "turn it (turn=180:0:0), or make its materials two-sided or opaque");
+    }
+    const auto repeats = [&](const SceneRecord& other) {
+      return bytes_of(scene) == bytes_of(other);
+    };
+    const auto earlier = std::span(content.scenes).first(i);
+    if (content.nodes.empty() && content.scene_clips.empty() && ranges::any_of(earlier, repeats)) {
+      doubt("scene.twice", scene, "another scene has the same model at the same place",
+            "leave one of the two out");
+    }
+  }
+  return found;
 }
 
 double scene_height_mm(const BundleView& bundle, std::uint32_t index) {
