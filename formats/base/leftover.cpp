@@ -48,13 +48,14 @@ void Leftover::forget() {
 }
 
 void remove_leftovers() {
+  // Taken out of the table, so that no other thread frees a path in use.
+  char* taken[kSlots];
+  for (int i = 0; i < kSlots; ++i) taken[i] = paths[i].exchange(nullptr);
   // A folder is removed after its files.
   constexpr int kDepth = 4;
   for (int pass = 0; pass < kDepth; ++pass) {
-    for (const std::atomic<char*>& path : paths) {
-      if (const char* const name = path.load()) {
-        if (::unlink(name) != 0) ::rmdir(name);
-      }
+    for (const char* const path : taken) {
+      if (path != nullptr && ::unlink(path) != 0) ::rmdir(path);
     }
   }
 }
