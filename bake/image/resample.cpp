@@ -17,8 +17,11 @@ float steady(double value) {
 }
 
 struct SrgbTables {
+  /// Cells of equal size between 0 and 1: at most two results fall into one.
+  static constexpr std::size_t kCells = 4096;
   std::array<float, 256> linear{};
   std::array<float, 255> threshold{};  ///< linear values half-way between value k and k + 1
+  std::array<std::uint8_t, kCells + 1> first{};  ///< the result for the least value of each cell
   SrgbTables() {
     for (std::size_t i = 0; i < 256; ++i) {
       linear[i] = steady(linear_of_srgb(static_cast<double>(i) / 255));
@@ -26,10 +29,17 @@ struct SrgbTables {
     for (std::size_t i = 0; i < 255; ++i) {
       threshold[i] = steady(linear_of_srgb((static_cast<double>(i) + 0.5) / 255));
     }
+    for (std::size_t i = 0; i <= kCells; ++i) {
+      const float least = static_cast<float>(i) / kCells;
+      const auto above = std::upper_bound(threshold.begin(), threshold.end(), least);
+      first[i] = static_cast<std::uint8_t>(above - threshold.begin());
+    }
   }
   [[nodiscard]] std::uint8_t to_srgb(float value) const {
-    const auto above = std::upper_bound(threshold.begin(), threshold.end(), value);
-    return static_cast<std::uint8_t>(above - threshold.begin());
+    const float inside = value > 0 ? std::min(value, 1.0F) : 0.0F;
+    std::uint8_t result = first[static_cast<std::size_t>(inside * kCells)];
+    while (result < 255 && threshold[result] <= value) ++result;
+    return result;
   }
 };
 
