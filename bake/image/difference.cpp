@@ -15,21 +15,10 @@ constexpr std::array<double, 2 * kRadius + 1> kWindow = {
     0.00102838, 0.00759876, 0.03600077, 0.10936069, 0.21300554, 0.26601172,
     0.21300554, 0.10936069, 0.03600077, 0.00759876, 0.00102838};
 
-struct Moments {
-  double mean_a = 0;
-  double mean_b = 0;
-  double square_a = 0;
-  double square_b = 0;
-  double product = 0;
+constexpr std::size_t kTaps = kWindow.size();
 
-  void add(double weight, const Moments& m) {
-    mean_a += weight * m.mean_a;
-    mean_b += weight * m.mean_b;
-    square_a += weight * m.square_a;
-    square_b += weight * m.square_b;
-    product += weight * m.product;
-  }
-};
+/// Sums over a window: of a, b, a * a, b * b and a * b.
+using Moments = std::array<double, 5>;
 
 /// BT.601 luma, 0-255.
 double luma(const RgbaImage& image, std::size_t pixel) {
@@ -40,11 +29,29 @@ double luma(const RgbaImage& image, std::size_t pixel) {
 double similarity(const Moments& m) {
   constexpr double kC1 = 0.01 * 255 * 0.01 * 255;
   constexpr double kC2 = 0.03 * 255 * 0.03 * 255;
-  const double variance_a = m.square_a - m.mean_a * m.mean_a;
-  const double variance_b = m.square_b - m.mean_b * m.mean_b;
-  const double covariance = m.product - m.mean_a * m.mean_b;
-  return (2 * m.mean_a * m.mean_b + kC1) * (2 * covariance + kC2) /
-         ((m.mean_a * m.mean_a + m.mean_b * m.mean_b + kC1) * (variance_a + variance_b + kC2));
+  const auto [mean_a, mean_b, square_a, square_b, product] = m;
+  const double variance_a = square_a - mean_a * mean_a;
+  const double variance_b = square_b - mean_b * mean_b;
+  const double covariance = product - mean_a * mean_b;
+  return (2 * mean_a * mean_b + kC1) * (2 * covariance + kC2) /
+         ((mean_a * mean_a + mean_b * mean_b + kC1) * (variance_a + variance_b + kC2));
+}
+
+/// The moments of a row's pixels, one by one.
+void pixel_moments(const RgbaImage& a, const RgbaImage& b, std::size_t row,
+                   std::vector<Moments>& moments) {
+  for (std::size_t x = 0; x < a.width; ++x) {
+    const double p = luma(a, row * a.width + x);
+    const double q = luma(b, row * a.width + x);
+    moments[x] = {p, q, p * p, q * q, p * q};
+  }
+}
+
+/// Adds `count` moments, weighted, to as many.
+void add_weighted(const Moments* from, double weight, std::size_t count, Moments* to) {
+  const double* numbers = from->data();
+  double* sums = to->data();
+  for (std::size_t i = 0; i < 5 * count; ++i) sums[i] += weight * numbers[i];
 }
 
 double psnr_of(std::uint64_t sum_of_squares, std::uint64_t samples) {
@@ -115,31 +122,31 @@ RgbaImage quality_picture(const RgbaImage& source, const RgbaImage& decoded) {
 
 double ssim(const RgbaImage& a, const RgbaImage& b) {
   if (a.width != b.width || a.height != b.height || a.pixels.empty()) return 0;
-  const std::uint32_t width = a.width;
-  const std::uint32_t height = a.height;
-  std::vector<Moments> column(width);
+  const std::size_t width = a.width;
+  std::array<std::vector<Moments>, kTaps> rows;  // by row, modulo their number
+  rows.fill(std::vector<Moments>(width));
+  std::vector<Moments> column(width + 2 * kRadius);  // the edges' columns repeated
+  std::vector<Moments> window(width);
   double sum = 0;
-  for (std::uint32_t y = 0; y < height; ++y) {
+  std::size_t next = 0;  // row whose moments are not there
+  for (std::int64_t y = 0; y < a.height; ++y) {
+    for (; next <= clamped(y + kRadius, a.height); ++next) {
+      pixel_moments(a, b, next, rows[next % kTaps]);
+    }
     std::fill(column.begin(), column.end(), Moments{});
-    for (int k = -kRadius; k <= kRadius; ++k) {
-      const std::size_t row = clamped(std::int64_t{y} + k, height) * width;
-      const double weight = kWindow[static_cast<std::size_t>(k + kRadius)];
-      for (std::size_t x = 0; x < width; ++x) {
-        const double p = luma(a, row + x);
-        const double q = luma(b, row + x);
-        column[x].add(weight, {p, q, p * p, q * q, p * q});
-      }
+    std::fill(window.begin(), window.end(), Moments{});
+    for (std::size_t k = 0; k < kTaps; ++k) {
+      const auto row = clamped(y + static_cast<int>(k) - kRadius, a.height);
+      add_weighted(rows[row % kTaps].data(), kWindow[k], width, &column[kRadius]);
     }
-    for (std::uint32_t x = 0; x < width; ++x) {
-      Moments m;
-      for (int k = -kRadius; k <= kRadius; ++k) {
-        m.add(kWindow[static_cast<std::size_t>(k + kRadius)],
-              column[clamped(std::int64_t{x} + k, width)]);
-      }
-      sum += similarity(m);
+    std::fill_n(column.begin(), kRadius, column[kRadius]);
+    std::fill_n(column.end() - kRadius, kRadius, column[width + kRadius - 1]);
+    for (std::size_t k = 0; k < kTaps; ++k) {
+      add_weighted(&column[k], kWindow[k], width, window.data());
     }
+    for (const Moments& moments : window) sum += similarity(moments);
   }
-  return sum / (static_cast<double>(width) * height);
+  return sum / (static_cast<double>(width) * a.height);
 }
 
 }  // namespace modar

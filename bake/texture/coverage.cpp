@@ -141,14 +141,15 @@ std::uint8_t to_byte(float value) {
   return static_cast<std::uint8_t>(std::clamp(value, 0.0F, 255.0F) + 0.5F);
 }
 
-/// Whether any texel of the rectangle [left, right) x [top, bottom), cut to the mask, is covered.
-bool any_covered(const CoverageMask& mask, std::int64_t left, std::int64_t top, std::int64_t right,
-                 std::int64_t bottom) {
-  for (std::int64_t y = std::max<std::int64_t>(top, 0);
-       y < std::min<std::int64_t>(bottom, mask.height); ++y) {
-    for (std::int64_t x = std::max<std::int64_t>(left, 0);
-         x < std::min<std::int64_t>(right, mask.width); ++x) {
-      if (mask.covered[static_cast<std::size_t>(y * mask.width + x)] != 0) return true;
+/// Whether any texel in these columns and rows, as far as the mask has them, is covered.
+bool any_covered(const CoverageMask& mask, const Span& columns, const Span& rows) {
+  const std::int64_t left = std::max<std::int64_t>(columns.first, 0);
+  const std::int64_t right = std::min<std::int64_t>(columns.last, std::int64_t{mask.width} - 1);
+  const std::int64_t bottom = std::min<std::int64_t>(rows.last, std::int64_t{mask.height} - 1);
+  for (std::int64_t y = std::max<std::int64_t>(rows.first, 0); y <= bottom; ++y) {
+    const std::uint8_t* row = &mask.covered[static_cast<std::size_t>(y * mask.width)];
+    if (std::any_of(row + left, row + right + 1, [](std::uint8_t c) { return c != 0; })) {
+      return true;
     }
   }
   return false;
@@ -201,19 +202,17 @@ void cover_triangle(CoverageMask& mask, const std::array<std::array<double, 2>, 
 
 CoverageMask resize_coverage(const CoverageMask& mask, std::uint32_t width, std::uint32_t height) {
   CoverageMask out = make_coverage(width, height);
-  const auto first = [](std::uint64_t i, std::uint32_t from, std::uint32_t to) {
-    return static_cast<std::int64_t>(i * from / to);
+  // The texels of the mask that one of the result touches in a direction.
+  const auto touched = [](std::uint64_t i, std::uint64_t from, std::uint64_t to) {
+    return Span{static_cast<std::int64_t>(i * from / to),
+                static_cast<std::int64_t>(((i + 1) * from - 1) / to)};
   };
-  const auto end = [](std::uint64_t i, std::uint32_t from, std::uint32_t to) {
-    return static_cast<std::int64_t>(((i + 1) * from + to - 1) / to);
-  };
+  std::vector<Span> columns;
+  for (std::uint32_t x = 0; x < width; ++x) columns.push_back(touched(x, mask.width, width));
   for (std::uint32_t y = 0; y < height; ++y) {
+    const Span rows = touched(y, mask.height, height);
     for (std::uint32_t x = 0; x < width; ++x) {
-      out.covered[std::size_t{y} * width + x] =
-          any_covered(mask, first(x, mask.width, width), first(y, mask.height, height),
-                      end(x, mask.width, width), end(y, mask.height, height))
-              ? 1
-              : 0;
+      out.covered[std::size_t{y} * width + x] = any_covered(mask, columns[x], rows) ? 1 : 0;
     }
   }
   return out;
@@ -271,7 +270,7 @@ void flatten_uncovered_blocks(RgbaImage& image, const CoverageMask& mask) {
   }
   for (std::int64_t top = 0; top < image.height; top += 4) {
     for (std::int64_t left = 0; left < image.width; left += 4) {
-      if (any_covered(mask, left - 1, top - 1, left + 5, top + 5)) continue;
+      if (any_covered(mask, {left - 1, left + 4}, {top - 1, top + 4})) continue;
       for (std::int64_t y = top; y < std::min<std::int64_t>(top + 4, image.height); ++y) {
         for (std::int64_t x = left; x < std::min<std::int64_t>(left + 4, image.width); ++x) {
           std::copy(mean.begin(), mean.end(),
