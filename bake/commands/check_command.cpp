@@ -61,6 +61,11 @@ void print_looks(const std::vector<ModelLook>& looks) {
     std::printf("model '%s': SSIM %.4f, worst %.4f; colour off by %.2f, worst %.2f; see %s\n",
                 look.name.c_str(), look.ssim_mean, look.ssim_worst, look.delta_e_mean,
                 look.delta_e_worst, look.picture.c_str());
+    for (const ClipLook& clip : look.clips) {
+      std::printf("  clip '%s': SSIM %.4f, worst %.4f at %.2f s; colour off by %.2f, worst %.2f\n",
+                  clip.name.c_str(), clip.ssim_mean, clip.ssim_worst, clip.worst_s,
+                  clip.delta_e_mean, clip.delta_e_worst);
+    }
     for (const LevelLook& level : look.levels) {
       std::printf(
           "  level %u, from %.0f pixels down: differs by %.1f of 255 in the mean (%.1f at most in "

@@ -80,6 +80,18 @@ Json levels_json(const std::vector<LevelLook>& levels) {
   });
 }
 
+Json clips_json(const std::vector<ClipLook>& clips) {
+  return Json::list(clips, [&](const ClipLook& clip) -> Json {
+    return {{"clip", clip.name},
+            {"ssim_mean", clip.ssim_mean},
+            {"ssim_worst", clip.ssim_worst},
+            {"delta_e_mean", clip.delta_e_mean},
+            {"delta_e_worst", clip.delta_e_worst},
+            {"worst_view", clip.worst_view},
+            {"worst_s", clip.worst_s}};
+  });
+}
+
 Json looks_json(const std::vector<ModelLook>& looks) {
   return Json::list(looks, [&](const ModelLook& look) -> Json {
     return {{"model", look.name},
@@ -90,6 +102,7 @@ Json looks_json(const std::vector<ModelLook>& looks) {
             {"delta_e_worst", look.delta_e_worst},
             {"worst_view", look.worst_view},
             {"picture", look.picture.empty() ? Json() : Json(look.picture)},
+            {"clips", clips_json(look.clips)},
             {"levels", levels_json(look.levels)}};
   });
 }

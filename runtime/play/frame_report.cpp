@@ -258,6 +258,7 @@ std::string turntable_line(const TurntableReport& report) {
   return json_line([&](JsonText& writer) {
     count(writer, "frame", report.frame);
     text(writer, report.pattern ? "pattern" : "model", report.name);
+    if (!report.clip.empty()) text(writer, "clip", report.clip);
     number(writer, "angle_deg", report.angle_deg);
     count(writer, "triangles", report.triangles);
     count(writer, "draw_calls", static_cast<std::uint64_t>(report.draw_calls));

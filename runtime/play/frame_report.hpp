@@ -135,11 +135,13 @@ std::string frame_line(const FrameReport& report, std::span<const std::string> p
 /// ms: medians, camera: of the last frame.
 std::string summary_line(const RunStats& stats);
 
-/// {frame,model,angle_deg,triangles,draw_calls,ms:{render}}: a picture of the turntable. `pattern`
-/// in place of `model` in a bundle of pictures and videos alone.
+/// {frame,model,clip,angle_deg,triangles,draw_calls,ms:{render}}: a picture of the turntable. clip:
+/// of a model that has some. `pattern` in place of `model` in a bundle of pictures and videos
+/// alone.
 struct TurntableReport {
   std::uint64_t frame = 0;
   std::string_view name;
+  std::string_view clip;
   bool pattern = false;
   double angle_deg = 0;
   std::uint64_t triangles = 0;

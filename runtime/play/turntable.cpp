@@ -21,6 +21,7 @@
 namespace modar {
 namespace {
 
+constexpr double kFps = 30;
 constexpr double kTiltDegrees = 20;  ///< seen from a little above, as an object on a table
 
 /// The ball round the origin that holds the model's chunks (model space).
@@ -81,32 +82,20 @@ struct Subject {
   std::string_view name;
   double radius = 0;            ///< of the ball round the origin that holds it
   std::vector<DrawItem> items;  ///< with to_eye and world_to_eye for an eye at the origin
+  std::uint32_t clip = kNone;   ///< in which its one item moves
 };
 
 Subject model_subject(const BundleView& bundle, std::uint32_t model) {
   const Stand stand = stand_of(bundle, model);
   return {bundle.name(bundle.models()[model].name),
           radius_of(bundle, model) * static_cast<double>(stand.record.scale),
-          {on_turntable(stand, model, glm::mat4(1.0f))}};
-}
-
-/// Plays the clip of the model's scene, or its first one; nothing where it has none.
-void begin_clip(const BundleView& bundle, std::uint32_t model, std::optional<ClipPlayer>& player) {
-  const std::uint32_t scene = stand_of(bundle, model).scene;
-  std::uint32_t clip = 0;
-  while (clip < bundle.clips().size() && bundle.clips()[clip].model != model) ++clip;
-  for (const SceneClipRecord& record : bundle.scene_clips()) {
-    if (record.scene == scene) clip = record.clip;
-  }
-  if (clip == bundle.clips().size()) return;
-  player.emplace(bundle, model);
-  player->play(clip, true, 0);
-  player->pose();
+          {on_turntable(stand, model, glm::mat4(1.0f))},
+          kNone};
 }
 
 /// The first pictures of a pattern, videos with their posters.
 Subject pattern_subject(const BundleView& bundle, std::uint32_t pattern) {
-  Subject subject{bundle.name(bundle.patterns()[pattern].name), 0, {}};
+  Subject subject{bundle.name(bundle.patterns()[pattern].name), 0, {}, kNone};
   add_items(bundle, ActionMachine(bundle), pattern, subject.items);
   for (const DrawItem& item : subject.items) {
     const glm::mat4& place = item.to_eye;  // of a square from -1 to 1
@@ -117,21 +106,36 @@ Subject pattern_subject(const BundleView& bundle, std::uint32_t pattern) {
   return subject;
 }
 
-/// The n-th model; of a bundle without models the n-th pattern, whose items may be none.
-Subject subject_of(const BundleView& bundle, std::uint32_t n) {
-  return bundle.models().empty() ? pattern_subject(bundle, n) : model_subject(bundle, n);
+/// Models, once for each of their clips; of a bundle without models its patterns.
+std::vector<Subject> subjects_of(const BundleView& bundle) {
+  std::vector<Subject> subjects;
+  for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
+    const std::size_t before = subjects.size();
+    for (std::uint32_t c = 0; c < bundle.clips().size(); ++c) {
+      if (bundle.clips()[c].model != m) continue;
+      subjects.push_back(model_subject(bundle, m));
+      subjects.back().clip = c;
+    }
+    if (subjects.size() == before) subjects.push_back(model_subject(bundle, m));
+  }
+  for (std::uint32_t p = 0; bundle.models().empty() && p < bundle.patterns().size(); ++p) {
+    Subject subject = pattern_subject(bundle, p);
+    if (!subject.items.empty()) subjects.push_back(std::move(subject));
+  }
+  return subjects;
+}
+
+/// Plays on in time, but faster where a turn would end before the clip.
+double seconds_of_step(const BundleView& bundle, std::uint32_t clip, int steps) {
+  return std::max(1 / kFps, static_cast<double>(bundle.clips()[clip].seconds) / steps);
 }
 
 }  // namespace
 
 Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle,
                             const MappedFile& file) {
-  constexpr double kFps = 30;
-  const bool models = !bundle.models().empty();
-  const std::size_t count = models ? bundle.models().size() : bundle.patterns().size();
-  std::uint32_t first = 0;
-  while (first < count && subject_of(bundle, first).items.empty()) ++first;
-  if (first == count) {
+  const std::vector<Subject> subjects = subjects_of(bundle);
+  if (subjects.empty()) {
     return fail(ExitCode::kInvalidInput, "play.no-models", options.bundle,
                 "it holds no model, and shows no picture at first", "bake it with --model FILE");
   }
@@ -141,17 +145,21 @@ Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle
 
   const Camera camera = default_camera(options.width, options.height);
   TurntableReport turn;
-  turn.pattern = !models;
+  turn.pattern = bundle.models().empty();
   FrameReport report;
   catch_interrupts();
-  for (std::uint32_t n = first; n < count; ++n) {
-    const Subject subject = subject_of(bundle, n);
-    if (subject.items.empty()) continue;
+  for (const Subject& subject : subjects) {
     const double distance = distance_of(camera, subject.radius);
     turn.name = subject.name;
+    turn.clip = subject.clip == kNone ? "" : bundle.name(bundle.clips()[subject.clip].name);
     std::vector<DrawItem> items = subject.items;
     std::optional<ClipPlayer> player;
-    if (models) begin_clip(bundle, n, player);
+    double step = 0;
+    if (subject.clip != kNone) {
+      step = seconds_of_step(bundle, subject.clip, options.turntable);
+      player.emplace(bundle, items[0].model).play(subject.clip, true, 0);
+      player->pose();
+    }
     for (int i = 0; i < options.turntable; ++i) {
       turn.angle_deg = 360.0 * i / options.turntable;
       const glm::mat4 view = turned(turn.angle_deg, distance);
@@ -180,7 +188,7 @@ Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle
       }
       ++turn.frame;
       if (!player) continue;
-      player->advance(1 / kFps);
+      player->advance(step);
       player->pose();
     }
   }

@@ -1,6 +1,7 @@
 """Clips of glTF files from the command line: which one plays, in a single bake and in a project, and files that contradict themselves."""
 import copy
 import json
+import re
 import subprocess
 import sys
 import unittest
@@ -79,6 +80,32 @@ class Clips(ProgramTest):
     def clips(self, bundle):
         read = json.loads(subprocess.run([sys.executable, ROOT / "scripts/read_bundle.py", "--json", bundle], capture_output=True, text=True, check=True).stdout)
         return [(each["name"], each["seconds"]) for each in read["clips"]]
+
+    def test_clips_are_looked_at_beside_their_source_and_shown(self):
+        """`check --visual`, the report's stills and the turntable. A source of which one clip moves otherwise is found: its rest is the same."""
+        self.document["materials"] = [{"doubleSided": True}]
+        self.document["meshes"][0]["primitives"][0]["material"] = 0
+        self.write(self.document)
+        self.assertEqual(self.modar("bake", "m.gltf", "-o", "m.modar").returncode, 0)
+        channels = self.document["animations"][1]["channels"]
+        for code, differs in ((0, []), (3, ["model 'm', clip 'wave'"])):
+            done = self.modar("check", "m.modar", "--source", "m.gltf", "--visual", "looks", "--json")
+            self.assertEqual(done.returncode, code, done.stderr)
+            told = json.loads(done.stdout)
+            self.assertEqual([issue["where"] for issue in told["issues"] if issue["id"] == "VISUAL_DIFFERS"], differs)
+            clips = told["looks"][0]["clips"]
+            self.assertEqual([(clip["clip"], clip["ssim_worst"] > 0.95 and clip["delta_e_worst"] < 3) for clip in clips], [("walk", True), ("wave", code == 0)])
+            self.document["animations"][1]["channels"] = [each for each in channels if each["target"]["path"] != "translation"]
+            self.write(self.document)
+        self.assertEqual(self.modar("report", "m.modar", "-o", "m.html", "--quiet").returncode, 0)
+        stills = re.findall(r'alt="Clip .(\w+). at (\d\.\d\d) s" src="([^"]+)"', (self.folder / "m.html").read_text(encoding="utf-8"))
+        self.assertEqual([each[:2] for each in stills], [(clip, at) for clip in ("walk", "wave") for at in ("0.33", "1.00", "1.67")])
+        self.assertEqual([len({each[2] for each in stills[:3]}), stills[0][2]], [3, stills[3][2]])
+        done = self.run_program("modar-play", "m.modar", "--turntable", "3", "--out", "turn", "--size", "96x64", "--json")
+        self.assertEqual([(line["clip"], line["angle_deg"]) for line in map(json.loads, done.stdout.splitlines())],
+                         [(clip, angle) for clip in ("walk", "wave") for angle in (0, 120, 240)])
+        pictures = [path.read_bytes() for path in sorted((self.folder / "turn").iterdir())]
+        self.assertEqual((len(set(pictures)), pictures[:3]), (3, pictures[3:]))
 
     def test_repair_says_that_it_leaves_them_out(self):
         done = self.modar("bake", "m.gltf", COVER, "-o", "m.modar", "--repair", *QUICK)

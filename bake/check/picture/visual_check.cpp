@@ -18,6 +18,7 @@
 #include "bake/check/verdict.hpp"
 #include "bake/image/difference.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/mesh/clip/movement.hpp"
 #include "bake/mesh/repair/repair.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/texture/relief/relief.hpp"
@@ -64,6 +65,7 @@ std::size_t shown_pixels(const RgbaImage& image, const std::array<std::uint8_t, 
 /// Share of the fullest view's pixels. Smaller views see a sheet from its edge, which two renderers
 /// round differently.
 constexpr double kLeastShown = 0.02;
+constexpr std::size_t kClipTimes = 3;  ///< each in the middle of a third
 
 RgbaImage cut(const RgbaImage& image, const Crop& crop) {
   RgbaImage out{crop.right - crop.left, crop.bottom - crop.top, {}};
@@ -149,6 +151,7 @@ class VisualComparer {
     Report quiet;
     MODAR_ASSIGN(SourceModel source, read_model(asked.path, {options_.jobs, asked.own_picture}));
     if (options_.repair) repair_model(source, options_.repair_support, quiet);
+    const SourceMovement movement = std::move(source.movement);
     MODAR_ASSIGN(TriMesh mesh, weld(std::move(source), quiet, {options_.jobs, options_.crease}));
     const auto upright = stated_upright(bundle_, index);
     ReliefOptions relief;
@@ -161,7 +164,15 @@ class VisualComparer {
     look.judged = !translucent(mesh, bundle_, bundle_.models()[index]);
     if (!look.judged) return look;
     MODAR_ASSIGN(const std::vector<SoftTexture> textures, load_textures(mesh, options_.jobs));
-    compare(index, mesh, textures, look);
+    worst_ssim_ = 2;
+    static_cast<ViewsLook&>(look) = compare({index, mesh, textures}, 0, 1);
+    for (std::uint32_t c = 0; c < bundle_.clips().size(); ++c) {
+      if (bundle_.clips()[c].model != index) continue;
+      const auto clip =
+          ranges::find(movement.clips, bundle_.name(bundle_.clips()[c].name), &SourceClip::name);
+      if (clip != movement.clips.end())
+        look.clips.push_back(clip_look({index, mesh, textures}, movement, *clip, c));
+    }
     if (!options_.picture_folder.empty()) {
       look.picture =
           (std::filesystem::path(options_.picture_folder) / (look.name + ".png")).string();
@@ -172,27 +183,59 @@ class VisualComparer {
   }
 
  private:
-  void compare(std::uint32_t index, const TriMesh& mesh, const std::vector<SoftTexture>& textures,
-               ModelLook& look) {
+  struct Subject {
+    std::uint32_t model = 0;
+    const TriMesh& mesh;
+    const std::vector<SoftTexture>& textures;
+    const BoneMatrix* bones = nullptr;
+  };
+
+  ClipLook clip_look(const Subject& rest, const SourceMovement& movement, const SourceClip& clip,
+                     std::uint32_t number) {
+    ClipLook look;
+    look.name = clip.name;
+    look.ssim_mean = 0;
+    for (std::size_t i = 0; i < kClipTimes; ++i) {
+      const double time = clip.duration * (2.0 * static_cast<double>(i) + 1) / (2 * kClipTimes);
+      ClipPlayer player(bundle_, rest.model);
+      player.play(number, false, 0);
+      player.advance(time);
+      player.pose();
+      const ViewsLook views = compare({rest.model, moved_mesh(rest.mesh, movement, clip, time),
+                                       rest.textures, player.bones().data()},
+                                      i, kClipTimes);
+      look.ssim_mean += views.ssim_mean / kClipTimes;
+      look.delta_e_mean += views.delta_e_mean / kClipTimes;
+      look.delta_e_worst = std::max(look.delta_e_worst, views.delta_e_worst);
+      if (i > 0 && views.ssim_worst >= look.ssim_worst) continue;
+      look.ssim_worst = views.ssim_worst;
+      look.worst_view = views.worst_view;
+      look.worst_s = time;
+    }
+    return look;
+  }
+
+  /// Every `step`th view.
+  ViewsLook compare(const Subject& subject, std::size_t first, std::size_t step) {
     double radius = 0;
-    for (const glm::dvec3& p : mesh.positions) radius = std::max(radius, glm::length(p));
-    // The sphere around the model fills the view.
+    for (const glm::dvec3& p : subject.mesh.positions) radius = std::max(radius, glm::length(p));
+    // The sphere around the model fills the view; of one that comes too close, what fits.
+    radius = std::min(radius, 0.9 * kViewDistance);
     camera_.fx = camera_.fy =
         0.49 * options_.side * std::sqrt(kViewDistance * kViewDistance / (radius * radius) - 1);
-    look.ssim_worst = 2;
-    look.ssim_mean = look.delta_e_mean = 0;
+    ViewsLook look{0, 2, 0, 0, 0};
     const auto views = view_directions();
     std::vector<RgbaImage> drawn;
     std::size_t most_shown = 0;
-    for (std::size_t view = 0; view < kViews; ++view) {
-      drawn.push_back(draw(index, view_from(views[view])));
+    for (std::size_t view = first; view < kViews; view += step) {
+      drawn.push_back(draw(subject, view_from(views[view])));
       most_shown = std::max(most_shown, shown_pixels(drawn.back(), clear_));
     }
     double shown_views = 0;
-    for (std::size_t view = 0; view < kViews; ++view) {
-      const RgbaImage wanted =
-          render_reference(mesh, textures, camera_, view_from(views[view]), render_);
-      const RgbaImage& shown = drawn[view];
+    for (std::size_t view = first; view < kViews; view += step) {
+      const RgbaImage wanted = render_reference(subject.mesh, subject.textures, camera_,
+                                                view_from(views[view]), render_);
+      const RgbaImage& shown = drawn[(view - first) / step];
       const std::size_t pixels =
           std::max(shown_pixels(wanted, clear_), shown_pixels(shown, clear_));
       if (kLeastShown * static_cast<double>(most_shown) > static_cast<double>(pixels)) continue;
@@ -207,21 +250,26 @@ class VisualComparer {
       if (similar < look.ssim_worst) {
         look.ssim_worst = similar;
         look.worst_view = static_cast<int>(view);
+      }
+      if (similar < worst_ssim_) {
+        worst_ssim_ = similar;
         worst_ = quality_picture(wanted, shown);
       }
       if (options_.progress) {
-        options_.progress((index + static_cast<double>(view + 1) / kViews) /
+        options_.progress((subject.model + static_cast<double>(view + 1) / kViews) /
                           bundle_.models().size());
       }
     }
     // A sheet shows nothing from behind.
-    if (shown_views == 0) return;
+    if (shown_views == 0) return {};
     look.ssim_mean /= shown_views;
     look.delta_e_mean /= shown_views;
+    return look;
   }
 
-  RgbaImage draw(std::uint32_t index, const glm::dmat4& to_eye) {
-    const DrawItem item{index, glm::mat4(to_eye)};
+  RgbaImage draw(const Subject& subject, const glm::dmat4& to_eye) {
+    DrawItem item{subject.model, glm::mat4(to_eye)};
+    item.bones = subject.bones;
     const DepthRange range = depth_range(bundle_, {&item, 1});
     renderer_->render(RgbImage{}, gl_projection(camera_, range.near_plane, range.far_plane),
                       {&item, 1});
@@ -233,16 +281,24 @@ class VisualComparer {
   }
 
   void judge(std::uint32_t index, const ModelLook& look) {
+    judge(index, look, "model '" + look.name + "'", "in the worst of 12 views");
+    for (const ClipLook& clip : look.clips) {
+      judge(index, clip, "model '" + look.name + "', clip '" + clip.name + "'",
+            "at " + std::to_string(clip.worst_s) + " s");
+    }
+  }
+
+  void judge(std::uint32_t index, const ViewsLook& look, const std::string& what,
+             const std::string& when) {
     if (look.ssim_worst >= options_.least_ssim && look.delta_e_worst <= options_.greatest_delta_e)
       return;
     const ModelRecord& model = bundle_.models()[index];
-    sink_(Issue{&workstation_issue_kind(WorkstationRule::kVisualDiffers),
-                "model '" + look.name + "'",
+    sink_(Issue{&workstation_issue_kind(WorkstationRule::kVisualDiffers), what,
                 static_cast<std::uint64_t>(reinterpret_cast<const std::byte*>(&model) -
                                            bundle_.bytes().data()),
-                "in the worst of 12 views SSIM is " + std::to_string(look.ssim_worst) +
-                    " (at least " + std::to_string(options_.least_ssim) +
-                    "), the colour is off by " + std::to_string(look.delta_e_worst) + " (at most " +
+                when + " SSIM is " + std::to_string(look.ssim_worst) + " (at least " +
+                    std::to_string(options_.least_ssim) + "), the colour is off by " +
+                    std::to_string(look.delta_e_worst) + " (at most " +
                     std::to_string(options_.greatest_delta_e) + ")"});
   }
 
@@ -255,7 +311,8 @@ class VisualComparer {
   std::unique_ptr<GlContext> context_;
   std::vector<std::byte> plain_bytes_;  ///< the bundle as the reference is lit
   std::unique_ptr<Renderer> renderer_;  ///< of these, then of the bundle
-  RgbaImage worst_;
+  double worst_ssim_ = 2;               ///< of a model, at rest and in its clips
+  RgbaImage worst_;                     ///< that view
 };
 
 }  // namespace

@@ -31,15 +31,26 @@ struct VisualOptions {
   std::function<void(double done)> progress;  ///< may be empty
 };
 
-/// The views of one model: from the 12 corners of an icosahedron.
-struct ModelLook {
-  std::string name;
-  bool judged = false;  ///< false: it is translucent, which the reference does not draw
+/// Views from corners of an icosahedron, 12 in all.
+struct ViewsLook {
   double ssim_mean = 1;
   double ssim_worst = 1;
   double delta_e_mean = 0;   ///< see mean_delta_e(); mean over the views
   double delta_e_worst = 0;  ///< of the worst view
   int worst_view = 0;
+};
+
+/// A clip at three times, with a third of the views each.
+struct ClipLook : ViewsLook {
+  std::string name;
+  double worst_s = 0;  ///< time of the worst view
+};
+
+/// The views of one model at rest, and of its clips.
+struct ModelLook : ViewsLook {
+  std::string name;
+  bool judged = false;            ///< false: it is translucent, which the reference does not draw
+  std::vector<ClipLook> clips;    ///< that the source has by that name
   std::string picture;            ///< source and bundle side by side; empty: not written
   std::vector<LevelLook> levels;  ///< each where it is first drawn, the finest left out
 };

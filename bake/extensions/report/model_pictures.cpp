@@ -151,6 +151,30 @@ RgbaImage ModelCamera::standing(std::uint32_t index, const glm::dquat& rotation)
                        {index, glm::mat4(model_view(rotation)), kNone, glm::mat4(table_view())});
 }
 
+RgbaImage ModelCamera::moving(std::uint32_t clip, double share) {
+  const BundleView& bundle = state_->bundle;
+  const ClipRecord& record = bundle.clips()[clip];
+  const glm::dmat4 view = model_view(upright(bundle, record.model));
+  std::vector<glm::dvec3> eyes;
+  visit_boxes(bundle, bundle.models()[record.model], [&](const auto& least, const auto& most) {
+    for (int i = 0; i < 8; ++i) {
+      glm::dvec4 corner(0, 0, 0, 1);
+      for (int axis = 0; axis < 3; ++axis)
+        corner[axis] = static_cast<double>((i >> axis & 1) == 0 ? least[axis] : most[axis]);
+      eyes.emplace_back(view * corner);
+    }
+  });
+  Camera& camera = state_->camera;
+  camera.fx = camera.fy = fitting_focal(eyes, camera.width, camera.height);
+  ClipPlayer player(bundle, record.model);
+  player.play(clip, false, 0);
+  player.advance(share * static_cast<double>(record.seconds));
+  player.pose();
+  DrawItem item{record.model, glm::mat4(view), kNone, glm::mat4(table_view())};
+  item.bones = player.bones().data();
+  return state_->shoot(RgbImage{}, item);
+}
+
 RgbaImage ModelCamera::scene(std::uint32_t index) {
   const SceneRecord& scene = state_->bundle.scenes()[index];
   const PatternRecord& pattern = state_->bundle.patterns()[scene.pattern];

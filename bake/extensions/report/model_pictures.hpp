@@ -30,6 +30,8 @@ class ModelCamera {
   RgbaImage turned(std::uint32_t index, double degrees);
   /// A model alone, with its axes turned so.
   RgbaImage standing(std::uint32_t index, const glm::dquat& rotation);
+  /// A model in a clip of its, at a share of the clip's time, from where all of them are in sight.
+  RgbaImage moving(std::uint32_t clip, double share);
   /// A scene's model on its pattern, seen as somebody at a table sees it.
   RgbaImage scene(std::uint32_t index);
 

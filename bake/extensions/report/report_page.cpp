@@ -264,9 +264,31 @@ class Page {
                "stroke-width=\".25\" "
                "stroke-linejoin=\"round\">" +
                wires + "</svg></div><div><h3>" + escape_html(title) + "</h3><dl>" + model_rows(m) +
-               "</dl></div></article>\n";
+               "</dl>";
+      for (std::uint32_t c = 0; c < bundle_.clips().size(); ++c) {
+        if (bundle_.clips()[c].model == m) MODAR_TRY(clip(c));
+      }
+      html_ += "</div></article>\n";
     }
     html_ += "</div>\n</section>\n";
+    return {};
+  }
+
+  /// Three stills.
+  Result<void> clip(std::uint32_t index) {
+    const ClipRecord& record = bundle_.clips()[index];
+    const std::string title = "Clip \u201c" + name(record.name) + "\u201d";
+    const auto seconds = static_cast<double>(record.seconds);
+    html_ += "<p class=\"note\">" + escape_html(title) + print(", %.3g s</p>", seconds);
+    if (camera_ == nullptr) return {};
+    html_ += "<div class=\"turns\">";
+    for (const double share : {1.0 / 6, 0.5, 5.0 / 6}) {
+      const std::string time = print("%.2f s", share * seconds);
+      MODAR_ASSIGN(const std::string shown,
+                   picture(quartered(camera_->moving(index, share)), title + " at " + time));
+      html_ += "<figure>" + shown + "<figcaption>" + time + "</figcaption></figure>";
+    }
+    html_ += "</div>";
     return {};
   }
 

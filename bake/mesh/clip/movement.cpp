@@ -277,4 +277,49 @@ FittedMovement fit_movement(const SourceModel& model, double bound, unsigned job
   return result;
 }
 
+namespace {
+
+/// Of any length. Bones of skins turn normals like points, nodes keep them perpendicular.
+glm::dvec3 normal_by(const glm::dmat3& m, bool skinned, const glm::dvec3& normal) {
+  if (skinned) return m * normal;
+  const glm::dmat3 cofactor(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
+  return glm::sign(glm::determinant(m)) * (cofactor * normal);
+}
+
+}  // namespace
+
+TriMesh moved_mesh(const TriMesh& mesh, const SourceMovement& movement, const SourceClip& clip,
+                   double time) {
+  const std::vector<glm::dmat4> joints = clip_pose(movement.joints, clip, time);
+  const auto& [center, scale] = mesh.placement;
+  TriMesh moved = mesh;
+  std::vector<bool> seen(mesh.positions.size(), false);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const std::uint32_t number = mesh.materials[mesh.triangle_material[t]].part;
+    if (number >= movement.parts.size()) continue;
+    const SourcePart& part = movement.parts[number];
+    const auto& [bones, targets] = part;
+    for (const std::uint32_t v : mesh.triangles[t]) {
+      if (seen[v]) continue;
+      seen[v] = true;
+      const VertexBones shares = mesh.vertex_bones.empty() ? VertexBones() : mesh.vertex_bones[v];
+      glm::dvec3 at = center + scale * mesh.positions[v];
+      for (std::size_t k = 0; k < targets.size(); ++k) {
+        const auto& [x, y, z] = shares.morphs;
+        at += joints[targets[k]][3].x / double{kMorphUnits} * glm::dvec3(x[k], y[k], z[k]);
+      }
+      glm::dmat4 turn(0.0);
+      for (std::size_t k = 0; k < 4; ++k) {
+        const SourceBone& bone = bones[shares.bones[k]];
+        turn += static_cast<double>(shares.weights[k]) * (joints[bone.joint] * bone.inverse);
+      }
+      moved.positions[v] = (glm::dvec3(turn * glm::dvec4(at, 1.0)) - center) / scale;
+      if (mesh.normals.empty()) continue;
+      const glm::vec3 normal = normal_by(glm::dmat3(turn), !part.rigid(), mesh.normals[v]);
+      if (glm::length(normal) > 0) moved.normals[v] = glm::normalize(normal);
+    }
+  }
+  return moved;
+}
+
 }  // namespace modar

@@ -8,6 +8,7 @@
 
 #include "bake/import/source_model.hpp"
 #include "bake/mesh/clip/clip_fit.hpp"
+#include "bake/mesh/tri_mesh.hpp"
 
 namespace modar {
 
@@ -31,5 +32,10 @@ struct FittedMovement {
 /// result does not depend on `jobs`.
 FittedMovement fit_movement(const SourceModel& model, double bound, unsigned jobs,
                             std::vector<Diagnostic>& diagnostics);
+
+/// A mesh of that movement's model at a time of a clip of the source, seconds: positions and
+/// normals.
+TriMesh moved_mesh(const TriMesh& mesh, const SourceMovement& movement, const SourceClip& clip,
+                   double time);
 
 }  // namespace modar
