@@ -72,6 +72,13 @@ constexpr double kMaxForeground = 0.97;
 constexpr double kFourSided = 0.85;
 // Area, relative to the foreground's, of another object that makes it doubtful.
 constexpr double kLeastRival = 0.4;
+// Shares of the photo that an object of any shape on a background has.
+constexpr double kLeastObject = 0.05;
+constexpr double kMostObject = 0.9;
+// Share of its hull that it fills. Lower: pictures of any content are doubted. [0.9, 0.97]
+constexpr double kSolid = 0.93;
+// Area of the next object, relative to it, at most. Higher: as above. [0.05, 0.2]
+constexpr double kAlone = 0.1;
 // From a side to the places that are compared, times the figure's size.
 constexpr double kApart = 0.02;
 // Of sharpness and division together: what another figure has to be better by.
@@ -80,6 +87,8 @@ constexpr double kBetter = 0.1;
 constexpr double kLeastShare = 0.25;
 // The same for sharp figures.
 constexpr double kLeastPicture = 0.08;
+// Longer side of a photo, in pixels, at least: smaller files are pictures.
+constexpr double kLeastPhoto = 640;
 // Of the file: a larger upright figure is a frame that is printed on the picture.
 constexpr double kLeastFrontal = 0.4;
 constexpr double kUpright = 0.007;  // sine of 0.4 degrees
@@ -238,13 +247,18 @@ bool convex(const std::array<Point, 4>& c) {
   return true;
 }
 
+/// Sides of a photo's border, for those that do not show the background. They can be joined.
+enum BorderSide : unsigned { kAtTop = 1, kAtRight = 2, kAtBottom = 4, kAtLeft = 8 };
+
 /// The object on the background that the photo's border shows: its outline, coarsely.
 class Foreground {
  public:
-  explicit Foreground(const cv::Mat& rgb) : scale_(kForegroundSide / std::max(rgb.cols, rgb.rows)) {
+  /// without: sides that the object may be beyond.
+  explicit Foreground(const cv::Mat& rgb, unsigned without = 0)
+      : scale_(kForegroundSide / std::max(rgb.cols, rgb.rows)) {
     cv::Mat small;
     cv::resize(rgb, small, cv::Size(), scale_, scale_, cv::INTER_AREA);
-    learn_ground(small);
+    learn_ground(small, without);
     // Ground is what the border's ground reaches: the same colours within the object are the
     // object's.
     cv::Mat ground(small.rows + 2, small.cols + 2, CV_8U, cv::Scalar(255));
@@ -259,6 +273,8 @@ class Foreground {
 
   /// Whether it is four-sided; otherwise nothing here says anything.
   [[nodiscard]] bool known() const { return known_; }
+  /// Whether it is solid and alone, of whatever shape.
+  [[nodiscard]] bool solitary() const { return solitary_; }
   /// Whether something else of its kind is there.
   [[nodiscard]] bool rivalled() const { return known_ && rival_ > kLeastRival; }
   [[nodiscard]] const std::array<Point, 4>& corners() const { return corners_; }
@@ -298,7 +314,7 @@ class Foreground {
     return (one(r) * kBins + one(g)) * kBins + one(b);
   }
 
-  void learn_ground(const cv::Mat& small) {
+  void learn_ground(const cv::Mat& small, unsigned without) {
     constexpr int kRing = 4;      // pixels
     constexpr double kBlur = 10;  // steps of a channel: a colour counts for its neighbours, too
     constexpr double kMinColourShare = 0.004;  // of the ring: rarer colours are chance
@@ -306,7 +322,10 @@ class Foreground {
     int count = 0;
     for (int y = 0; y < small.rows; ++y) {
       for (int x = 0; x < small.cols; ++x) {
-        if (y >= kRing && y < small.rows - kRing && x >= kRing && x < small.cols - kRing) continue;
+        const unsigned sides =
+            (y < kRing ? kAtTop : 0U) | (y >= small.rows - kRing ? kAtBottom : 0U) |
+            (x < kRing ? kAtLeft : 0U) | (x >= small.cols - kRing ? kAtRight : 0U);
+        if (sides == 0 || (sides & without) != 0) continue;
         const auto& c = small.at<cv::Vec3b>(y, x);
         for (int k = 0; k < 27; ++k) {
           ground_[bin(c[0] + kBlur * (k % 3 - 1), c[1] + kBlur * (k / 3 % 3 - 1),
@@ -338,15 +357,19 @@ class Foreground {
     mask_ = labels == areas[0].second;
     rival_ = areas.size() > 1 ? 1.0 * areas[1].first / areas[0].first : 0;
     const double share = 1.0 * areas[0].first / static_cast<double>(rest.total());
-    known_ = share > kMinForeground && share < kMaxForeground && fit_corners();
-  }
-
-  /// The four-sided figure of its hull.
-  bool fit_corners() {
     std::vector<std::vector<cv::Point>> outlines;
     cv::findContours(mask_, outlines, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
     std::vector<cv::Point> hull;
     cv::convexHull(outlines.front(), hull);
+    const double whole = cv::contourArea(outlines.front());
+    const double filled = whole / static_cast<double>(rest.total());
+    solitary_ = filled > kLeastObject && filled < kMostObject && rival_ <= kAlone &&
+                whole >= kSolid * cv::contourArea(hull);
+    known_ = share > kMinForeground && share < kMaxForeground && fit_corners(hull);
+  }
+
+  /// The four-sided figure of its hull.
+  bool fit_corners(const std::vector<cv::Point>& hull) {
     std::vector<cv::Point> four;
     for (double off = 1; off < kForegroundSide / 8 && (four.empty() || four.size() > 4); off += 1) {
       cv::approxPolyDP(hull, four, off, true);
@@ -375,6 +398,7 @@ class Foreground {
   cv::Mat mask_;
   std::array<Point, 4> corners_;
   bool known_ = false;
+  bool solitary_ = false;
   double rival_ = 0;
 };
 
@@ -973,6 +997,10 @@ Point magnified(const Point& place, double factor) {
   return (place + Point(0.5, 0.5)) * factor - Point(0.5, 0.5);
 }
 
+bool is_within(const Point& at, const RgbaImage& photo) {
+  return at.x >= -0.5 && at.y >= -0.5 && at.x <= photo.width - 0.5 && at.y <= photo.height - 0.5;
+}
+
 Result<FoundCorners> search(const RgbaImage& photo) {
   const cv::Mat rgba(static_cast<int>(photo.height), static_cast<int>(photo.width), CV_8UC4,
                      const_cast<std::uint8_t*>(photo.pixels.data()));
@@ -1019,6 +1047,7 @@ Result<FoundCorners> search(const RgbaImage& photo) {
   corners = refine(Gradients(rgb), corners, {1.2 * step, 1.2, 1.2});
   for (std::size_t i = 0; i < 4; ++i) {
     const Point corner = magnified(corners[i], fine);
+    if (!is_within(corner, photo)) return not_found("a corner of the object is outside the photo");
     found.corners[i] = {corner.x, corner.y};
   }
   return found;
@@ -1035,10 +1064,9 @@ bool is_upright(const std::array<Point, 4>& corners) {
 
 /// Of the shapes that cameras have, and as large as they make them.
 bool has_camera_shape(double width, double height) {
-  constexpr double kLeastPixels = 640;
   constexpr double kShapes[] = {4.0 / 3, 3.0 / 2, 16.0 / 9};
   const double shape = std::max(width, height) / std::min(width, height);
-  return std::max(width, height) >= kLeastPixels &&
+  return std::max(width, height) >= kLeastPhoto &&
          ranges::any_of(kShapes, [&](double one) { return std::fabs(shape / one - 1) < 0.005; });
 }
 
@@ -1091,6 +1119,34 @@ bool has_print_around(const RgbaImage& image, const std::array<Point, 4>& corner
   return cv::countNonZero(print) > kPrintAround * around;
 }
 
+/// Share of equal neighbours on the border from which a background is drawn, not photographed.
+constexpr double kDrawnGround = 0.9;
+
+bool has_drawn_ground(const cv::Mat& rgb) {
+  int equal = 0;
+  int all = 0;
+  for (const int y : {0, rgb.rows - 1}) {
+    for (int x = 1; x < rgb.cols; ++x, ++all) {
+      if (rgb.at<cv::Vec3b>(y, x) == rgb.at<cv::Vec3b>(y, x - 1)) ++equal;
+    }
+  }
+  return equal >= kDrawnGround * all;
+}
+
+/// Whether a photo shows a single thing on a background, perhaps cut off by one or two of the
+/// photo's sides: the file is hardly the picture itself.
+bool shows_an_object(const RgbaImage& image) {
+  if (image.pixels.empty() || std::max(image.width, image.height) < kLeastPhoto) return false;
+  const cv::Mat rgba(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC4,
+                     const_cast<std::uint8_t*>(image.pixels.data()));
+  cv::Mat rgb;
+  cv::cvtColor(rgba, rgb, cv::COLOR_RGBA2RGB);
+  constexpr unsigned kCutOff[] = {
+      0, kAtTop, kAtRight, kAtBottom, kAtLeft, kAtTop | kAtBottom, kAtLeft | kAtRight};
+  return !has_drawn_ground(rgb) &&
+         ranges::any_of(kCutOff, [&](unsigned sides) { return Foreground(rgb, sides).solitary(); });
+}
+
 }  // namespace
 
 FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found) {
@@ -1098,7 +1154,11 @@ FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found)
   const double height = photo.image.height;
   FoundPicture picture;
   picture.doubt = photo.focal_px > 0 || has_camera_shape(width, height) ? "not-found" : "";
-  if (!found) return picture;
+  const auto whole = [&] {
+    if (shows_an_object(photo.image)) picture.doubt = "object";
+    return picture;
+  };
+  if (!found) return whole();
   std::array<Point, 4> corners;
   for (std::size_t i = 0; i < 4; ++i) corners[i] = {found->corners[i].x, found->corners[i].y};
   const double share = area_of(corners) / (width * height);
@@ -1106,7 +1166,7 @@ FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found)
   cut.corners = found->corners;
   const bool unsharp = found->sharpness < kDoubtfulSharpness && !found->clear();
   const bool part = share < (unsharp ? kLeastShare : kLeastPicture) || !cut.validate();
-  if (part) return picture;
+  if (part) return whole();
   const bool frontal = share > kLeastFrontal && is_upright(corners);
   // A scan has such edges within it; the photo of a print from straight above has them around it.
   if (found->fills || !frontal || !found->clear()) picture.doubt = "";
@@ -1128,6 +1188,7 @@ FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found)
 
 std::string_view doubt_words(std::string_view doubt) {
   if (doubt == "rivalled") return "there are several flat objects in the photo";
+  if (doubt == "object") return "it shows an object on a background, but not all its four edges";
   return doubt == "blurred"  ? "an edge is hidden or blurred"
          : doubt == "framed" ? "there are edges around or beyond them, perhaps those of the sheet"
          : doubt == "upright"

@@ -54,14 +54,15 @@ struct FoundCorners {
 /// lines to figures, and the best one's sides are fitted to the photo's edges to sub-pixels, those
 /// of the object rather than of a frame printed on it. Which corner is the object's own top-left
 /// nobody can tell: it is taken to be upright. Errors: kInvalidInput "rectify.not-found", where no
-/// figure stands out sharply or two do.
+/// figure stands out sharply, two do, or a corner is outside the photo.
 Result<FoundCorners> find_corners(const RgbaImage& photo);
 
 /// The picture of a pattern in its file.
 struct FoundPicture {
   /// To 0.01 pixels, see FoundCorners; nothing: the file is the picture.
   std::optional<std::array<PixelPoint, 4>> corners;
-  const char* doubt = "";  ///< why that may be wrong, as above, or "not-found"; empty: it is sure
+  const char* doubt =
+      "";  ///< why that may be wrong: as above, "not-found" or "object"; empty: it is sure
 };
 FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found);
 /// The doubt in words for a message: "an edge is hidden or blurred".

@@ -375,6 +375,32 @@ TEST(FindPicture, APhotoInWhichNothingIsFoundIsWarnedOf) {
   EXPECT_STREQ(find_picture(photo, find_corners(photo.image)).doubt, "not-found");
 }
 
+/// A photo of 1.3 to 1, which is no camera's shape: a cropped one.
+FoundPicture seen_in(const cv::Mat& photo) {
+  const Photo cropped{as_photo(photo(cv::Rect(0, 0, 936, 720)))};
+  return find_picture(cropped, find_corners(cropped.image));
+}
+
+TEST(FindPicture, AnObjectWithoutFourEdgesInThePhotoIsWarnedOf) {
+  const cv::Mat mural = asset("mural.png");
+  cv::Mat sticker = photograph(mural, backdrop(""), {});
+  EXPECT_STREQ(seen_in(sticker).doubt, "");
+  cv::circle(sticker, {430, 350}, 200, cv::Scalar(40, 30, 200), -1, cv::LINE_AA);
+  EXPECT_STREQ(seen_in(sticker).doubt, "object");
+  const Corners left = {{{-90, 150.6f}, {520.2f, 120.4f}, {560.8f, 560.1f}, {-70, 520.9f}}};
+  EXPECT_STREQ(seen_in(photograph(mural, backdrop(""), left)).doubt, "object");
+  const Corners both = {{{250.3f, -90}, {600.2f, -80}, {640.8f, 790}, {220.7f, 780}}};
+  EXPECT_STREQ(seen_in(photograph(mural, backdrop(""), both)).doubt, "object");
+  const Corners corner = {{{-14, 150.6f}, {720.2f, 120.4f}, {760.8f, 560.1f}, {220.7f, 520.9f}}};
+  const FoundPicture cut = seen_in(photograph(mural, backdrop(""), corner));
+  EXPECT_FALSE(cut.corners);
+  EXPECT_STREQ(cut.doubt, "object");
+  // A disc that a program drew on an even ground is a picture.
+  cv::Mat drawn(720, 960, CV_8UC3, cv::Scalar(200, 220, 240));
+  cv::circle(drawn, {430, 350}, 200, cv::Scalar(40, 30, 200), -1, cv::LINE_AA);
+  EXPECT_STREQ(seen_in(drawn).doubt, "");
+}
+
 TEST(FindCorners, NothingThatStandsOutIsAnError) {
   const auto empty = find_corners(as_photo(backdrop("")));
   ASSERT_FALSE(empty);

@@ -173,9 +173,12 @@ Result<void> find_picture(PatternRequest& pattern, std::vector<Diagnostic>& said
       {sure ? "pattern.photo" : "pattern.doubtful",
        sure ? DiagnosticSeverity::kInfo : DiagnosticSeverity::kWarning, pattern.path, 0,
        what + (sure ? "" : ", which may be wrong: " + std::string(doubt_words(found.doubt))),
-       "look at it with `modar pattern rectify " + pattern.path +
-           " -o picture.png`; corners= in its shape sets "
-           "other corners, shape=flat takes the whole file"});
+       found.corners
+           ? "look at it with `modar pattern rectify " + pattern.path +
+                 " -o picture.png`; corners= in its shape sets other corners, shape=flat takes the "
+                 "whole file"
+           : std::string("a photo needs all four edges in it; corners= in its shape sets the "
+                         "corners; shape=flat says that the whole file is right")});
   return {};
 }
 
