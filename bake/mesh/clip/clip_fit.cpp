@@ -81,13 +81,14 @@ class Fit {
     for (const SourceTrack& track : clip.tracks) tracks_.push_back(dense(track, clip.duration));
   }
 
-  /// The greatest distance that a point has from its rest place.
-  [[nodiscard]] double motion() const {
+  /// A point is further than the bound from its rest place at some time.
+  [[nodiscard]] bool moves(double bound) const {
     const auto rest = composed(joints_, rest_places(joints_));
-    return greatest([&rest](std::uint32_t) { return rest; });
+    return greatest(bound, [&rest](std::uint32_t) { return rest; }) > bound;
   }
 
-  /// Keys whose tracks are within `share` of the bound, each by itself.
+  /// Keys whose tracks are within `share` of the bound, each by itself. Its error is the greatest,
+  /// or one above the bound.
   [[nodiscard]] FittedClip pack(double bound, double share) const {
     FittedClip fitted;
     std::vector<std::pair<TrackRecord, std::vector<Key>>> kept;
@@ -104,15 +105,17 @@ class Fit {
     ClipTracksView view;
     view_clip_tracks(fitted.bytes, static_cast<std::uint32_t>(joints_.size()), view);
     std::vector<std::uint32_t> keys;
-    fitted.error = greatest([&](std::uint32_t i) { return tracks_pose(joints_, view, i, keys); });
+    fitted.error =
+        greatest(bound, [&](std::uint32_t i) { return tracks_pose(joints_, view, i, keys); });
     return fitted;
   }
 
  private:
+  /// The greatest distance of a point, or one that is above `enough`.
   template <class Pose>
-  double greatest(const Pose& pose) const {
+  double greatest(double enough, const Pose& pose) const {
     double most = 0;
-    for (std::uint32_t i = 0; i < samples_; ++i) {
+    for (std::uint32_t i = 0; i < samples_ && std::sqrt(most) <= enough; ++i) {
       const std::vector<glm::dmat4> other = pose(i);
       for (const JointPoints& each : points_) {
         const glm::dmat4 apart = other[each.joint] - poses_[i][each.joint];
@@ -362,15 +365,13 @@ std::vector<glm::dmat4> tracks_pose(std::span<const SourceJoint> joints, const C
 FittedClip fit_clip(std::span<const SourceJoint> joints, const SourceClip& clip,
                     std::span<const JointPoints> points, double bound) {
   const Fit fit(joints, clip, points);
-  if (fit.motion() <= bound) return {};
+  if (!fit.moves(bound)) return {};
   // Tracks of one chain add up, seldom at their worst: the most that the measured error allows.
-  FittedClip best = fit.pack(bound, 1.0 / 256);
-  for (const double share : {1.0 / 64, 1.0 / 16, 1.0 / 8, 1.0 / 4, 1.0 / 2, 1.0}) {
-    FittedClip next = fit.pack(bound, share);
-    if (next.error > bound) break;
-    best = std::move(next);
-  }
-  return best;
+  constexpr double kLeastShare = 1.0 / 256;
+  double share = 1;
+  FittedClip fitted = fit.pack(bound, share);
+  while (fitted.error > bound && share > kLeastShare) fitted = fit.pack(bound, share /= 2);
+  return fitted;
 }
 
 }  // namespace modar

@@ -5,9 +5,12 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <tuple>
+#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 
 #include "formats/base/parallel.hpp"
 #include "formats/clips.hpp"
@@ -22,6 +25,8 @@ constexpr float kMuch = 0.25f;
 /// Beyond the samples, between which parts move on: of a part's diagonal.
 constexpr double kBetween = 0.005;
 constexpr std::uint32_t kStretches = 64;  ///< of samples, measured by one thread each
+/// Vertices whose places are bounded together, and sought where a bound is not enough.
+constexpr std::size_t kCluster = 8;
 
 using PartBox = FittedMovement::Box;
 
@@ -52,6 +57,7 @@ std::vector<std::vector<std::uint32_t>> vertices_of(const SourceModel& model) {
 
 /// A vertex with what moves it: the shares of the source, and those that are stored.
 struct MovedVertex {
+  std::uint32_t number = 0;
   glm::dvec4 at{0.0};
   int count = 0;
   std::array<std::uint8_t, 4> bones{};
@@ -59,10 +65,69 @@ struct MovedVertex {
   std::array<double, 4> stored{};
 };
 
+/// Vertices of a part with the same bones.
+struct Cluster {
+  std::size_t first = 0;
+  std::size_t end = 0;
+  int count = 0;
+  std::array<std::uint8_t, 4> bones{};
+  glm::dvec3 middle{0.0};
+  glm::dvec3 half{0.0};
+  /// Greatest distance of stored shares from those of the source: of the sum, then of each bone
+  /// but the first.
+  std::array<double, 4> rounding{};
+  std::size_t parts = 0;  ///< of it: as many of the next clusters; 0: it is not cut
+};
+
+/// A bone at a sample: from tracks as stored, and away from the source's place.
+struct PosedBone {
+  glm::dmat4 stored{1.0};
+  glm::dmat4 apart{0.0};
+};
+
+glm::dvec3 placed(const glm::dmat4& m, const glm::dvec3& p) {
+  return glm::dvec3(m[0]) * p.x + glm::dvec3(m[1]) * p.y + glm::dvec3(m[2]) * p.z +
+         glm::dvec3(m[3]);
+}
+
+/// How far from its middle a box with these half sides extends where a matrix takes it.
+glm::dvec3 reach_of(const glm::dmat4& m, const glm::dvec3& half) {
+  return glm::abs(glm::dvec3(m[0])) * half.x + glm::abs(glm::dvec3(m[1])) * half.y +
+         glm::abs(glm::dvec3(m[2])) * half.z;
+}
+
+/// The greatest length of what a matrix makes of a point of the cluster, from above.
+double length_of(const glm::dmat4& m, const Cluster& cluster) {
+  return glm::length(placed(m, cluster.middle)) + glm::length(reach_of(m, cluster.half));
+}
+
+bool inside(const PartBox& box, const glm::dvec3& middle, const glm::dvec3& reach) {
+  return glm::all(glm::lessThanEqual(box.low, middle - reach)) &&
+         glm::all(glm::lessThanEqual(middle + reach, box.high));
+}
+
+/// No vertex of the cluster is further than `most` from its place in the source, or out of the box.
+bool within(const Cluster& cluster, const std::vector<PosedBone>& bones, double most,
+            const PartBox& box) {
+  const glm::dmat4& first = bones[cluster.bones[0]].stored;
+  double apart = 0;
+  double rounded = cluster.rounding[0] > 0 ? cluster.rounding[0] * length_of(first, cluster) : 0;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(cluster.count); ++k) {
+    const PosedBone& bone = bones[cluster.bones[k]];
+    if (!inside(box, placed(bone.stored, cluster.middle), reach_of(bone.stored, cluster.half)))
+      return false;
+    apart = std::max(apart, length_of(bone.apart, cluster));
+    if (k > 0) rounded += cluster.rounding[k] * length_of(bone.stored - first, cluster);
+    if (apart + rounded > most) return false;
+  }
+  return true;
+}
+
 MovedVertex moved_vertex(const SourceModel& model, std::uint32_t v) {
   const VertexBones shares = model.vertex_bones.empty() ? VertexBones() : model.vertex_bones[v];
   const auto bytes = shares.bytes();
   MovedVertex vertex;
+  vertex.number = v;
   vertex.at = glm::dvec4(model.positions[v], 1.0);
   for (std::size_t k = 0; k < 4; ++k) {
     if (shares.weights[k] <= 0 && bytes[k] == 0) continue;
@@ -70,8 +135,62 @@ MovedVertex moved_vertex(const SourceModel& model, std::uint32_t v) {
     vertex.bones[n] = shares.bones[k];
     vertex.wanted[n] = static_cast<double>(shares.weights[k]);
     vertex.stored[n] = bytes[k] / 255.0;
+    for (std::size_t i = n; i > 0 && vertex.bones[i] < vertex.bones[i - 1]; --i) {
+      std::swap(vertex.bones[i], vertex.bones[i - 1]);
+      std::swap(vertex.wanted[i], vertex.wanted[i - 1]);
+      std::swap(vertex.stored[i], vertex.stored[i - 1]);
+    }
   }
   return vertex;
+}
+
+Cluster cluster_of(const std::vector<MovedVertex>& vertices, std::size_t first, std::size_t end) {
+  Cluster cluster{first, end, vertices[first].count, vertices[first].bones, {}, {}, {}, 0};
+  PartBox box = kNowhere;
+  for (std::size_t v = first; v < end; ++v) {
+    extend(box, glm::dvec3(vertices[v].at));
+    double sum = 0;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const double off = vertices[v].stored[k] - vertices[v].wanted[k];
+      sum += off;
+      if (k > 0) cluster.rounding[k] = std::max(cluster.rounding[k], std::abs(off));
+    }
+    cluster.rounding[0] = std::max(cluster.rounding[0], std::abs(sum));
+  }
+  cluster.middle = (box.low + box.high) / 2.0;
+  cluster.half = (box.high - box.low) / 2.0;
+  return cluster;
+}
+
+/// Halves, and halves of these.
+void split(std::vector<MovedVertex>& vertices, std::size_t first, std::size_t end,
+           std::vector<Cluster>& clusters) {
+  const std::size_t own = clusters.size();
+  clusters.push_back(cluster_of(vertices, first, end));
+  if (end - first <= kCluster) return;
+  const glm::dvec3& half = clusters[own].half;
+  const int longer = half.x >= half.y ? 0 : 1;
+  const int axis = half[longer] >= half.z ? longer : 2;
+  const std::size_t middle = (first + end) / 2;
+  const auto at = [&](std::size_t i) { return vertices.begin() + static_cast<std::ptrdiff_t>(i); };
+  std::nth_element(at(first), at(middle), at(end),
+                   [axis](const auto& a, const auto& b) { return a.at[axis] < b.at[axis]; });
+  split(vertices, first, middle, clusters);
+  split(vertices, middle, end, clusters);
+  clusters[own].parts = clusters.size() - own - 1;
+}
+
+std::vector<Cluster> clusters_of(std::vector<MovedVertex>& vertices) {
+  const auto bones = [](const MovedVertex& v) { return std::tie(v.count, v.bones); };
+  std::sort(vertices.begin(), vertices.end(),
+            [&](const auto& a, const auto& b) { return bones(a) < bones(b); });
+  std::vector<Cluster> clusters;
+  std::size_t end = 0;
+  for (std::size_t first = 0; first < vertices.size(); first = end) {
+    while (end < vertices.size() && bones(vertices[first]) == bones(vertices[end])) ++end;
+    split(vertices, first, end, clusters);
+  }
+  return clusters;
 }
 
 /// Of many points those that are furthest in some direction.
@@ -113,8 +232,12 @@ class Measure {
         extend(box, model.positions[v]);
         moved.push_back(moved_vertex(model, v));
       }
+      clusters_.push_back(clusters_of(moved));
     }
-    pose(clip_pose(joints(), {}, 0), boxes_);
+    const auto rest = clip_pose(joints(), {}, 0);
+    Most most{0, boxes_};
+    compare(rest, rest, most);
+    boxes_ = most.boxes;
   }
 
   [[nodiscard]] std::span<const SourceJoint> joints() const { return model_.movement.joints; }
@@ -148,25 +271,28 @@ class Measure {
     ClipTracksView view;
     view_clip_tracks(bytes, static_cast<std::uint32_t>(joints().size()), view);
     const std::uint32_t samples = view.header->sample_count;
-    std::vector<double> errors(kStretches, 0);
-    std::vector<std::vector<PartBox>> boxes(kStretches,
-                                            std::vector<PartBox>(boxes_.size(), kNowhere));
+    const auto at = [&](std::uint64_t part, std::uint64_t parts) {
+      return static_cast<std::uint32_t>(samples * part / parts);
+    };
+    std::vector<std::uint32_t> keys;
+    // What a few samples show bounds most vertices of the others.
+    Most start{0, boxes_};
+    for (std::uint32_t s = 0; s < kStretches; ++s)
+      measure(clip, view, at(s, kStretches), keys, start);
+    std::vector<Most> found(kStretches, start);
     parallel_rows(kStretches, jobs_, [&](std::uint32_t s) {
-      std::vector<std::uint32_t> keys;
-      const auto end = static_cast<std::uint32_t>(std::uint64_t{samples} * (s + 1) / kStretches);
-      for (auto i = static_cast<std::uint32_t>(std::uint64_t{samples} * s / kStretches); i < end;
-           ++i) {
-        const auto source = clip_pose(joints(), clip, clip.duration * i / (samples - 1));
-        const auto stored = tracks_pose(joints(), view, i, keys);
-        errors[s] = std::max(errors[s], compare(source, stored, boxes[s]));
-      }
+      std::vector<std::uint32_t> own_keys;
+      for (std::uint32_t i = at(s, kStretches); i < at(s + 1, kStretches); ++i)
+        measure(clip, view, i, own_keys, found[s]);
     });
-    for (const std::vector<PartBox>& each : boxes) {
-      for (std::size_t p = 0; p < each.size(); ++p) {
-        boxes_[p] = {glm::min(boxes_[p].low, each[p].low), glm::max(boxes_[p].high, each[p].high)};
+    for (const Most& each : found) {
+      start.error = std::max(start.error, each.error);
+      for (std::size_t p = 0; p < boxes_.size(); ++p) {
+        boxes_[p] = {glm::min(boxes_[p].low, each.boxes[p].low),
+                     glm::max(boxes_[p].high, each.boxes[p].high)};
       }
     }
-    return *std::max_element(errors.begin(), errors.end());
+    return start.error;
   }
 
   [[nodiscard]] std::vector<PartBox> boxes(double error) const {
@@ -183,58 +309,72 @@ class Measure {
     return model_.vertex_bones.empty() ? VertexBones() : model_.vertex_bones[vertex];
   }
 
-  [[nodiscard]] std::vector<glm::dmat4> bone_matrices(const std::vector<glm::dmat4>& joints,
-                                                      std::size_t part) const {
-    std::vector<glm::dmat4> result;
-    for (const SourceBone& bone : model_.movement.parts[part].bones) {
-      result.push_back(joints[bone.joint] * bone.inverse);
-    }
-    return result;
-  }
+  /// What samples have shown so far.
+  struct Most {
+    double error = 0;
+    std::vector<PartBox> boxes;
+  };
 
-  void pose(const std::vector<glm::dmat4>& joints, std::vector<PartBox>& boxes) const {
-    compare(joints, joints, boxes);
+  void measure(const SourceClip& clip, const ClipTracksView& view, std::uint32_t sample,
+               std::vector<std::uint32_t>& keys, Most& most) const {
+    const double time = clip.duration * sample / (view.header->sample_count - 1);
+    compare(clip_pose(joints(), clip, time), tracks_pose(joints(), view, sample, keys), most);
   }
 
   /// The greatest distance of a vertex in two poses: with its weights, and with these as stored.
-  double compare(const std::vector<glm::dmat4>& source, const std::vector<glm::dmat4>& stored,
-                 std::vector<PartBox>& boxes) const {
-    double most = 0;
-    for (std::size_t p = 0; p < vertices_.size(); ++p) {
-      const std::vector<glm::dmat4> exact = bone_matrices(source, p);
-      const std::vector<glm::dmat4> kept = bone_matrices(stored, p);
-      const std::vector<std::uint32_t>& targets = model_.movement.parts[p].targets;
-      double rounding = 0;  // of ways
-      for (const std::uint32_t t : targets)
-        rounding += std::abs(source[t][3].x) * std::sqrt(0.75) / kMorphUnits;
-      for (std::size_t n = 0; n < moved_[p].size(); ++n) {
-        const MovedVertex& vertex = moved_[p][n];
-        glm::dvec4 from = vertex.at;
-        glm::dvec4 to = vertex.at;
-        for (std::size_t t = 0; t < targets.size(); ++t) {
-          const auto& [x, y, z] = model_.vertex_bones[vertices_[p][n]].morphs;
-          const glm::dvec4 way = glm::dvec4(x[t], y[t], z[t], 0) / double{kMorphUnits};
-          from += source[targets[t]][3].x * way;
-          to += stored[targets[t]][3].x * way;
+  void compare(const std::vector<glm::dmat4>& source, const std::vector<glm::dmat4>& stored,
+               Most& most) const {
+    std::vector<PosedBone> bones;
+    for (std::size_t p = 0; p < moved_.size(); ++p) {
+      bones.clear();
+      for (const SourceBone& bone : model_.movement.parts[p].bones) {
+        const glm::dmat4 kept = stored[bone.joint] * bone.inverse;
+        bones.push_back({kept, kept - source[bone.joint] * bone.inverse});
+      }
+      const bool morphs = !model_.movement.parts[p].targets.empty();
+      for (std::size_t c = 0; c < clusters_[p].size(); ++c) {
+        const Cluster& cluster = clusters_[p][c];
+        if (!morphs && within(cluster, bones, most.error, most.boxes[p])) {
+          c += cluster.parts;
+          continue;
         }
-        glm::dvec3 wanted(0.0);
-        glm::dvec3 found(0.0);
-        for (std::size_t k = 0; k < static_cast<std::size_t>(vertex.count); ++k) {
-          wanted += vertex.wanted[k] * glm::dvec3(exact[vertex.bones[k]] * from);
-          found += vertex.stored[k] * glm::dvec3(kept[vertex.bones[k]] * to);
-        }
-        extend(boxes[p], found);
-        const glm::dvec3 apart = found - wanted;
-        most = std::max(most, glm::length(apart) + rounding);
+        for (std::size_t n = cluster.first; cluster.parts == 0 && n < cluster.end; ++n)
+          compare_vertex(p, n, bones, source, stored, most);
       }
     }
-    return most;
+  }
+
+  void compare_vertex(std::size_t part, std::size_t n, const std::vector<PosedBone>& bones,
+                      const std::vector<glm::dmat4>& source, const std::vector<glm::dmat4>& stored,
+                      Most& most) const {
+    const MovedVertex& vertex = moved_[part][n];
+    glm::dvec3 from(vertex.at);
+    glm::dvec3 to = from;
+    double rounding = 0;  // of ways
+    const std::vector<std::uint32_t>& targets = model_.movement.parts[part].targets;
+    for (std::size_t t = 0; t < targets.size(); ++t) {
+      const auto& [x, y, z] = model_.vertex_bones[vertex.number].morphs;
+      const glm::dvec3 way = glm::dvec3(x[t], y[t], z[t]) / double{kMorphUnits};
+      from += source[targets[t]][3].x * way;
+      to += stored[targets[t]][3].x * way;
+      rounding += std::abs(source[targets[t]][3].x) * std::sqrt(0.75) / kMorphUnits;
+    }
+    glm::dvec3 wanted(0.0);
+    glm::dvec3 found(0.0);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(vertex.count); ++k) {
+      const PosedBone& bone = bones[vertex.bones[k]];
+      wanted += vertex.wanted[k] * (placed(bone.stored, from) - placed(bone.apart, from));
+      found += vertex.stored[k] * placed(bone.stored, to);
+    }
+    extend(most.boxes[part], found);
+    most.error = std::max(most.error, glm::length(found - wanted) + rounding);
   }
 
   const SourceModel& model_;
   unsigned jobs_;
   std::vector<std::vector<std::uint32_t>> vertices_;  // of each part
-  std::vector<std::vector<MovedVertex>> moved_;       // the same
+  std::vector<std::vector<MovedVertex>> moved_;       // the same, as clusters hold them
+  std::vector<std::vector<Cluster>> clusters_;
   std::vector<PartBox> boxes_;
 };
 
