@@ -32,6 +32,7 @@
 #include "bake/texture/texture_stage.hpp"
 #include "formats/base/path.hpp"
 #include "formats/base/ranges.hpp"
+#include "formats/base/shortest_number.hpp"
 #include "formats/colour_grid.hpp"
 #include "formats/content_summary.hpp"
 #include "formats/field_table.hpp"
@@ -280,11 +281,12 @@ void draw_backs(TriMesh& mesh, const std::vector<bool>& backs, Report& report) {
     ++count;
   }
   if (count == 0) return;
-  report.diagnostics.push_back(
-      {"model.two-sided", DiagnosticSeverity::kInfo, mesh.name, 0,
-       std::to_string(count) + " of " + std::to_string(mesh.materials.size()) +
-           " materials are on open or inside-out surfaces: both sides of them are drawn",
-       ""});
+  report.diagnostics.push_back({"model.two-sided", DiagnosticSeverity::kInfo, mesh.name, 0,
+                                std::to_string(count) + " of " +
+                                    std::to_string(mesh.materials.size()) +
+                                    (count == 1 ? " material is" : " materials are") +
+                                    " on open or inside-out surfaces: both sides are drawn",
+                                ""});
 }
 
 Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& request,
@@ -560,6 +562,10 @@ Result<void> add_colours(const PatternRequest& request, const PatternFeatures& b
   return {};
 }
 
+/// Widths in millimetres beyond which a print is hardly one.
+constexpr double kLeastPrint = 5;
+constexpr double kMostPrint = 20000;
+
 Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptions& loop,
                          BundleContent& content, Report& report, BakeTrace& trace) {
   if (is_target_file(request.path)) {
@@ -571,6 +577,11 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
   Result<PatternFeatures> baked = bake_pattern(request.path, request.width_mm,
                                                content.parameter_sets, loop, report, request.shape);
   if (!baked) return tl::unexpected(baked.error());
+  if (request.width_mm > 0 && (request.width_mm < kLeastPrint || request.width_mm > kMostPrint)) {
+    report.diagnostics.push_back({"pattern.width", DiagnosticSeverity::kWarning, request.path, 0,
+                                  "its printed width is " + shortest_text(request.width_mm) + " mm",
+                                  "a width is written with its unit, as in 210mm"});
+  }
   PatternRecord record = baked->record;
   record.name = content.intern(request.name);
   trace.ranges.push_back(baked->range);

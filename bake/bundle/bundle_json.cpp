@@ -472,7 +472,9 @@ std::string scene_words(const BundleView& bundle, std::uint32_t index) {
   char text[48];
   constexpr double kFlat = 0.05;  // mm: a flat sheet has no height
   if (const double height = scene_height_mm(bundle, index); height > kFlat) {
-    std::snprintf(text, sizeof text, "%.4g mm high", height);
+    const bool metres = height >= 10000;
+    std::snprintf(text, sizeof text, metres ? "%.4g m high" : "%.4g mm high",
+                  metres ? height / 1000 : height);
   } else {
     std::snprintf(text, sizeof text, "scale %.4g", static_cast<double>(scene.scale));
   }

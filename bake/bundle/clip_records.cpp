@@ -163,8 +163,9 @@ Result<void> add_scene_clips(const std::vector<SceneRequest>& scenes, BundleCont
     const auto found = std::find(names.begin(), names.end(), scene.clip);
     if (found == names.end() && !scene.clip.empty() && scene.clip != kNoClip) {
       return fail(ExitCode::kUsage, "scene.clip", scene.clip,
-                  "the model '" + scene.model + "' has no clip of that name",
-                  names.empty() ? "no clip of it moves anything" : cure_of_name(scene.clip, names));
+                  "the model '" + scene.model + "' has no " +
+                      (names.empty() ? "animation" : "clip of that name"),
+                  names.empty() ? "leave clip= out" : cure_of_name(scene.clip, names));
     }
     // A clip of that name comes before the word.
     if (names.empty() || (found == names.end() && scene.clip == kNoClip)) continue;

@@ -17,6 +17,7 @@
 #include "bake/commands/project_command.hpp"
 #include "bake/image/image.hpp"
 #include "bake/import/read_model.hpp"
+#include "bake/io/input.hpp"
 #include "bake/io/output.hpp"
 #include "bake/io/terminal.hpp"
 #include "bake/memory/memory_limit.hpp"
@@ -61,10 +62,15 @@ Result<void> take_files(BakeCommand& command) {
     paths.push_back(picture.path);
   }
   const SortedFiles sorted = sort_files(paths);
+  for (const std::string& path : paths) {
+    if (std::error_code error; !std::filesystem::exists(path, error)) MODAR_TRY(read_file(path, 0));
+  }
   for (const std::string& path : sorted.pictures) command.patterns.push_back(texts[path]);
   for (const auto* list : {&sorted.models, &sorted.others}) {
     for (const std::string& path : *list) {
-      if (!is_material_file(path)) command.models.push_back(texts[path]);
+      if (is_material_file(path)) continue;
+      MODAR_TRY(require_model_format(path));
+      command.models.push_back(texts[path]);
     }
   }
   for (const std::string& path : sorted.textures) {
@@ -118,11 +124,11 @@ Result<void> complete(BakeCommand& command) {
 void print_summary(const BundleView& bundle, const Report& report, const std::string& path) {
   for (std::uint32_t m = 0; m < bundle.models().size(); ++m) {
     const ModelRecord& model = bundle.models()[m];
-    std::fprintf(stderr,
-                 "model   %-16s %llu triangles, %llu vertices, %u chunks, off by at most %s\n",
+    std::fprintf(stderr, "model   %-16s %llu triangles, %llu vertices, %u %s, off by at most %s\n",
                  std::string(bundle.name(model.name)).c_str(),
                  static_cast<unsigned long long>(model.triangle_count),
                  static_cast<unsigned long long>(model.vertex_count), model.chunk_count,
+                 model.chunk_count == 1 ? "chunk" : "chunks",
                  length_words(model.position_error_max, model).c_str());
     if (const auto topology = stated_topology(bundle, m)) {
       std::fprintf(stderr, "        %s\n", topology_words(*topology).c_str());

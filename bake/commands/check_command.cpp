@@ -127,16 +127,13 @@ int run_check(const CheckCommand& command) {
   }
 
   const IssueSink sink = [&verdict](const Issue& issue) { verdict.add(issue); };
-  const bool sound = check_whole(file->bytes(), *device, sink);
+  const bool sound = check_all(file->bytes(), *device, command.jobs, sink);
   CheckExtras extras;
   if (*device != nullptr) extras.device = (*device)->name;
-  if (sound) {
+  if (sound && !command.sources.empty()) {
     const Result<BundleView> bundle = BundleView::open(file->bytes());
-    check_content(*bundle, sink, {.jobs = command.jobs});
-    if (!command.sources.empty()) {
-      if (auto done = check_against_sources(*bundle, command, sink, extras); !done) {
-        return print_error(done.error());
-      }
+    if (auto done = check_against_sources(*bundle, command, sink, extras); !done) {
+      return print_error(done.error());
     }
   }
 

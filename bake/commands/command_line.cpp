@@ -11,6 +11,7 @@
 
 #include "bake/io/terminal.hpp"
 #include "formats/base/nearest.hpp"
+#include "formats/base/ranges.hpp"
 
 namespace modar {
 
@@ -192,6 +193,10 @@ std::string full_name(const CLI::App& app) {
 }
 
 /// The first word of the command line that nothing takes, and the name that it is nearest to.
+/// Keys of --scene that people write as options of `modar bake`.
+constexpr std::string_view kSceneKeys[] = {"--height", "--width",  "--scale", "--up",
+                                           "--turn",   "--offset", "--clip"};
+
 std::optional<Error> unknown_word(const CLI::App* app) {
   while (!app->get_subcommands().empty()) app = app->get_subcommands().front();
   const std::vector<std::string> left = app->remaining();
@@ -200,6 +205,7 @@ std::optional<Error> unknown_word(const CLI::App* app) {
   const bool is_option = word.starts_with('-');
   std::vector<std::string> names;
   if (is_option) {
+    if (full_name(*app) == "modar bake") names.assign(std::begin(kSceneKeys), std::end(kSceneKeys));
     for (const CLI::Option* option : app->get_options()) {
       for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
     }
@@ -210,8 +216,11 @@ std::optional<Error> unknown_word(const CLI::App* app) {
     if (names.empty()) return std::nullopt;
   }
   const std::string_view meant = nearest_name(word, names);
+  const bool of_scene = ranges::find(kSceneKeys, meant) != std::end(kSceneKeys);
   const std::string cure = meant.empty() ? "see `" + full_name(*app) + " --help`"
-                                         : "did you mean " + std::string(meant) + "?";
+                           : of_scene    ? "write it in --scene, as in --scene PATTERN=MODEL," +
+                                            std::string(meant.substr(2)) + "=..."
+                                      : "did you mean " + std::string(meant) + "?";
   return Error{ExitCode::kUsage, "cli.unknown", word,
                is_option ? "there is no such option" : "there is no such command", cure};
 }

@@ -30,6 +30,10 @@ constexpr Signature kSignatures[] = {{"\x89PNG\r\n"sv, 0, FileKind::kPicture, "P
                                      {"ftyphei"sv, 4, FileKind::kPicture, "HEIC"},
                                      {"ftypmif1"sv, 4, FileKind::kPicture, "HEIF"},
                                      {"ftypavif"sv, 4, FileKind::kPicture, "AVIF"},
+                                     {"ftyp"sv, 4, FileKind::kVideo, "MP4"},
+                                     {"AVI "sv, 8, FileKind::kVideo, "AVI"},
+                                     {"\x1A\x45\xDF\xA3"sv, 0, FileKind::kVideo, "WebM"},
+                                     {"PK\3\4"sv, 0, FileKind::kArchive, "packed files"},
                                      {"glTF"sv, 0, FileKind::kModel, "glTF"},
                                      {"ply\n"sv, 0, FileKind::kModel, "PLY"},
                                      {"ply\r"sv, 0, FileKind::kModel, "PLY"},
@@ -49,7 +53,13 @@ constexpr KindWords kKinds[] = {
     {"picture", "image",
      "pass it as a pattern, with the ending of a picture; models are glTF, OBJ, PLY and STL files"},
     {"bundle", "bundle",
-     "`modar check`, `inspect`, `report` and `web` and modar-play take it; bake its sources"}};
+     "`modar check`, `inspect`, `report` and `web` and modar-play take it; bake its sources"},
+    {"video", "video", "take a picture of it: ffmpeg -i VIDEO -frames:v 1 picture.png"},
+    {"zip", "zip", "unzip it, and name its files; in a project's folder, run `modar bake`"}};
+
+std::string ending_of(const std::string& path) {
+  return ascii_lower(std::filesystem::path(path).extension().string());
+}
 
 /// An STL or OBJ file need not begin with words of its own. The size of a binary STL follows from
 /// its number of triangles; of the others the name says what they are.
@@ -63,7 +73,7 @@ const char* unsigned_model(std::string_view bytes, const std::string& path) {
     }
     if (count == (bytes.size() - kStlHeader) / kStlTriangle) return "STL";
   }
-  const std::string ending = ascii_lower(std::filesystem::path(path).extension().string());
+  const std::string ending = ending_of(path);
   return ending == ".stl" ? "STL" : ending == ".obj" ? "OBJ" : ending == ".gltf" ? "glTF" : nullptr;
 }
 
@@ -77,7 +87,9 @@ Result<void> require_kind(FileKind wanted, std::string_view start, const std::st
   const auto* found = ranges::find_if(kSignatures, [&](const Signature& one) {
     return start.size() > one.at && start.substr(one.at).starts_with(one.bytes);
   });
-  const bool known = found != std::end(kSignatures);
+  // Other formats, such as 3MF, are ZIP files, too.
+  const bool known = found != std::end(kSignatures) &&
+                     (found->kind != FileKind::kArchive || ending_of(path) == ".zip");
   const FileKind kind = known ? found->kind : FileKind::kModel;
   if (kind == wanted) return {};
   const char* format = known ? found->name : unsigned_model(start, path);

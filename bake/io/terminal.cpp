@@ -198,7 +198,10 @@ void print_findings(const std::vector<Diagnostic>& findings, bool all) {
         print_group(groups[g], whole);
       }
     }
-    if (left_out != 0) std::fprintf(stderr, "note: %zu more notes; --notes shows them\n", left_out);
+    if (left_out != 0) {
+      std::fprintf(stderr, "note: %zu more %s; --notes shows them\n", left_out,
+                   left_out == 1 ? "note" : "notes");
+    }
   }
 }
 

@@ -747,9 +747,11 @@ class ProjectReader {
     if (std::find(names.begin(), names.end(), name) != names.end()) return {};
     const std::string_view nearest = nearest_name(name, names);
     return fail(ExitCode::kInvalidInput, "project.scene-unknown", reader.at(key),
-                "there is no " + std::string(key) + " '" + name + "'",
-                nearest.empty() ? "name the file without folder and extension"
-                                : "did you mean '" + std::string(nearest) + "'?");
+                name.empty() ? "it names no " + std::string(key)
+                             : "there is no " + std::string(key) + " '" + name + "'",
+                name.empty()      ? "add " + std::string(key) + " = \"NAME\""
+                : nearest.empty() ? "name the file without folder and extension"
+                                  : "did you mean '" + std::string(nearest) + "'?");
   }
 
   /// Without [[scene]]: models are on patterns of their name, and one on one.

@@ -344,7 +344,7 @@ int run_verify(const CommandLine& line) {
 int run_fetch(CommandLine& line) {
   const auto key = read_small_file(line.trust_file, kMaxKeyBytes);
   if (!key) {
-    return answer({ExitCode::kIo, "io.open", line.trust_file, "it cannot be read",
+    return answer({ExitCode::kIo, "io.open", line.trust_file, "it cannot be read, or is no key",
                    "give the publisher's public key with --trust"});
   }
   if (auto trusted = parse_root_set(*key); !trusted) {

@@ -290,7 +290,7 @@ class Check(ProgramTest):
         picture(self.folder / "p.png")
         done = self.modar("bake", "down.gltf", "sheet.obj", "p.png", "--scene", "p=down", "--scene", "p=sheet,up=y,offset=0:20:0",
                           "--scene", "p=down", *QUICK, "-o", "o.modar")
-        self.assertIn("sheet: 1 of 1 materials are on open or inside-out surfaces: both sides of them are drawn", done.stderr)
+        self.assertIn("sheet: 1 of 1 material is on open or inside-out surfaces: both sides are drawn", done.stderr)
         self.assertIn("p=sheet: its offset is 20 times the pattern's longer side", done.stderr)
         self.assertEqual(done.stderr.count("p=down: nothing of the model is drawn"), 1)
         self.assertEqual(done.stderr.count("p=down: another scene has the same model at the same place"), 1)

@@ -43,6 +43,13 @@ class Clips(ProgramTest):
         self.assertIn("'walk'", done.stderr)
         self.assertFalse((self.folder / "n.modar").exists())
 
+    def test_moving_triangles_that_are_seen_through_have_no_order(self):
+        self.document = json.loads((MOVING.parent / "skinned.gltf").read_text())
+        self.document["materials"] = [{"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.35]}}]
+        self.document["meshes"][0]["primitives"][0]["material"] = 0
+        self.write(self.document)
+        self.assertEqual(len(self.played()), 1)
+
     def test_a_project_says_it_too_and_actions_play_and_stop(self):
         project = self.folder / "museum"
         project.mkdir()

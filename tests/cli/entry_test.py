@@ -190,6 +190,21 @@ class WrongFiles(ProgramTest):
         for data, kind in ((STL.encode(), "STL"), (binary, "STL"), (b"glTF" + bytes(40), "glTF"), (b"ply\n" + bytes(40), "PLY")):
             (self.folder / "m.png").write_bytes(data)
             self.assert_everywhere("m.png", f"this is a model ({kind}), not a picture; pass it as a model", model=False, code=1)
+
+    def test_a_video_and_a_zip_are_neither(self):
+        for data in (b"\0\0\0\x20ftypisom" + bytes(40), b"RIFF\0\0\0\0AVI " + bytes(40), b"\x1a\x45\xdf\xa3" + bytes(40)):
+            (self.folder / "clip.png").write_bytes(data)
+            self.assert_everywhere("clip.png", "not a picture; take a picture of it: ffmpeg", model=False, code=1)
+        (self.folder / "all.zip").write_bytes(b"PK\3\4" + bytes(40))
+        self.assert_fails(self.modar("bake", "all.zip"), 1, "this is a zip (packed files), not a model; unzip it")
+
+    def test_what_is_missing_is_named_before_options(self):
+        for words in (("missing.glb",), ("../nofolder",), (COVER, "missing.png")):
+            self.assert_fails(self.modar("bake", *words), 2, words[-1], "the file cannot be opened or read")
+
+    def test_a_first_version_of_gltf_is_called_so(self):
+        (self.folder / "old.gltf").write_text('{"nodes": {"a": {"meshes": ["m"]}}, "meshes": {"m": {}}}')
+        self.assert_fails(self.modar("bake", "old.gltf", "-o", "o.modar"), 5, "this is glTF 1.0; convert it to glTF 2.0")
         for words in (("--model", "good.png"), ("--pattern", "good.stl")):
             self.assert_fails(self.modar("bake", *words, "-o", "out.modar"), 1, "this is a ", "pass it as a ")
 

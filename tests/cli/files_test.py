@@ -286,6 +286,8 @@ class Words(ProgramTest):
                                     (["pattern", "scroe", "x.png"], "scroe", "score"),
                                     (["check", "x.modar", "--devise", "ace2"], "--devise", "--device")):
             self.assert_fails(self.modar(*words), 1, wrong, f"did you mean {meant}?")
+        for wrong, key in (("--hieght", "height"), ("--turn", "turn"), ("--widht", "width")):
+            self.assert_fails(self.modar("bake", wrong, "1"), 1, wrong, f"write it in --scene, as in --scene PATTERN=MODEL,{key}=...")
         done = self.modar("zzzzzzzz")
         self.assert_fails(done, 1, "zzzzzzzz", "--help")
         self.assertNotIn("did you mean", done.stderr)

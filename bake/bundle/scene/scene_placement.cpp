@@ -3,7 +3,6 @@
 #include "bake/bundle/scene/model_pose.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <span>
 
@@ -259,9 +258,6 @@ SceneRecord place_scene(const SceneRequest& resolved, const BundleContent& conte
 std::vector<Diagnostic> doubtful_scenes(const BundleContent& content) {
   std::vector<Diagnostic> found;
   const auto name_of = [&](NameRef name) { return content.names.substr(name.offset, name.length); };
-  const auto bytes_of = [](const SceneRecord& scene) {
-    return std::bit_cast<std::array<std::byte, sizeof(SceneRecord)>>(scene);
-  };
   const auto doubt = [&](const char* code, const SceneRecord& scene, const char* cause,
                          const char* cure) {
     const std::string file = name_of(content.patterns[scene.pattern].name) + "=" +
@@ -277,7 +273,10 @@ std::vector<Diagnostic> doubtful_scenes(const BundleContent& content) {
             "turn it (turn=180:0:0), or make its materials two-sided or opaque");
     }
     const auto repeats = [&](const SceneRecord& other) {
-      return bytes_of(scene) == bytes_of(other);
+      return scene.pattern == other.pattern && scene.model == other.model &&
+             scene.scale == other.scale &&
+             std::equal(scene.offset, scene.offset + 3, other.offset) &&
+             std::equal(scene.rotation, scene.rotation + 4, other.rotation);
     };
     const auto earlier = std::span(content.scenes).first(i);
     if (content.nodes.empty() && content.scene_clips.empty() && ranges::any_of(earlier, repeats)) {

@@ -10,6 +10,7 @@
 
 #include "bake/bundle/bundle_json.hpp"
 #include "bake/check/content/content_rules.hpp"
+#include "bake/check/verdict.hpp"
 #include "bake/json.hpp"
 #include "bake/pattern/score.hpp"
 #include "formats/base/path.hpp"
@@ -218,6 +219,13 @@ bool check_content(const BundleView& bundle, const IssueSink& sink, const Conten
     if (!log.done()) rules(log);
   }
   return log.good();
+}
+
+bool check_all(std::span<const std::byte> bytes, const DeviceProfile* device, unsigned jobs,
+               const IssueSink& sink) {
+  if (!check_whole(bytes, device, sink)) return false;
+  if (const auto bundle = BundleView::open(bytes)) check_content(*bundle, sink, {.jobs = jobs});
+  return true;
 }
 
 }  // namespace modar

@@ -2,11 +2,14 @@
 // shows records and payloads that contradict each other.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
+#include "modar/device_profile.hpp"
 
 namespace modar {
 
@@ -24,5 +27,10 @@ struct ContentOptions {
 /// good. Answers true if nothing was found.
 bool check_content(const BundleView& bundle, const IssueSink& sink,
                    const ContentOptions& options = {});
+
+/// All rules that need no source: check_whole(), and check_content() of sound bytes. Answers true if
+/// the bytes are sound.
+bool check_all(std::span<const std::byte> bytes, const DeviceProfile* device, unsigned jobs,
+               const IssueSink& sink);
 
 }  // namespace modar

@@ -132,13 +132,20 @@ void check_scene(ContentLog& log, const BundleContent& content, const Json& scen
   if (!fault.empty()) log.tell(WorkstationRule::kSceneContent, where, shadow.data(), fault);
 }
 
-/// Of a chunk that is seen through. Empty: it is drawn as it comes.
+bool moves(const BundleView& bundle, std::uint32_t material) {
+  for (const PartRecord& part : bundle.moving_parts()) {
+    if (part.material == material) return true;
+  }
+  return false;
+}
+
+/// Of a chunk that is seen through. Empty: it is drawn as it comes, as in moving ones.
 std::vector<DrawOrderRecord> order_of(const BundleView& bundle, const BundleContent& content,
                                       const ModelRecord& model, const ChunkRecord& chunk) {
   const LevelRecord& level = bundle.levels()[chunk.first_level];
   const std::size_t count = level.index_count / 3;
   if (!blended(content.materials[chunk.material], content) || count < 2 ||
-      count > kMostOrderedTriangles) {
+      count > kMostOrderedTriangles || moves(bundle, chunk.material)) {
     return {};
   }
   const VertexDecoder decoder(bundle.layouts()[model.layout]);

@@ -11,6 +11,7 @@
 
 #include "bake/bundle/bundle_json.hpp"
 #include "bake/bundle/scene/scene_placement.hpp"
+#include "bake/check/content/content_check.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/extensions/report/model_pictures.hpp"
 #include "bake/extensions/report/nodes_section.hpp"
@@ -114,7 +115,8 @@ class Page {
       : bundle_(bundle), options_(options), progress_(progress) {}
 
   Result<std::string> run() {
-    check_bundle(bundle_.bytes(), [&](const Issue& issue) { verdict_.add(issue); });
+    check_all(bundle_.bytes(), nullptr, options_.jobs,
+              [&](const Issue& issue) { verdict_.add(issue); });
     many_ = bundle_.models().size() + bundle_.scenes().size() > kManyModels;
     auto camera = ModelCamera::create(bundle_, many_ ? 320 : 640, many_ ? 240 : 480);
     if (camera) camera_ = std::move(*camera);

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <thread>
 #include <vector>
 
 #include "bake/bundle/bundle_json.hpp"
+#include "bake/check/content/content_check.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/extensions/studio/exports.hpp"
 #include "bake/extensions/studio/session.hpp"
@@ -107,10 +109,11 @@ Result<Json> check(Session& session, const std::string& device) {
   }
   MODAR_ASSIGN(const OpenBundle bundle, open_bundle(session));
   Verdict verdict;
-  check_whole(bundle.file.bytes(), profile, [&](const Issue& issue) {
-    // What the project says of it names models that are not in the bundle, too.
-    if (std::string_view(issue.kind->id) != "NEVER_SHOWN") verdict.add(issue);
-  });
+  check_all(bundle.file.bytes(), profile, std::thread::hardware_concurrency(),
+            [&](const Issue& issue) {
+              // What the project says of it names models that are not in the bundle, too.
+              if (std::string_view(issue.kind->id) != "NEVER_SHOWN") verdict.add(issue);
+            });
   MODAR_TRY(bundle.file.intact());
   Json findings = findings_json(verdict);
   Json warnings = bake_warnings(session, bundle.view);

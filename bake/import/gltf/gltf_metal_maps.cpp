@@ -221,8 +221,8 @@ void apply_metal_maps(const std::vector<MetalMap>& maps, const std::string& labe
   if (maps.empty()) return;
   model.diagnostics.push_back(
       {"gltf.metal-map", DiagnosticSeverity::kInfo, label, 0,
-       std::to_string(maps.size()) +
-           " materials have a metallic-roughness map; its means set the highlight of " +
+       std::to_string(maps.size()) + (maps.size() == 1 ? " material has" : " materials have") +
+           " a metallic-roughness map; its means set the highlight of " +
            std::to_string(maps.size() + model.materials.size() - before) + " groups of faces",
        ""});
   model.material_runs.clear();

@@ -25,6 +25,7 @@
 #include "bake/import/name_form.hpp"
 #include "bake/import/read_model.hpp"
 #include "bake/io/input.hpp"
+#include "bake/json.hpp"
 
 namespace modar {
 namespace {
@@ -419,11 +420,18 @@ bool is_dispensable(const std::string& extension) {
          extension.starts_with("KHR_materials_");
 }
 
+/// Whether nodes are in an object, as in glTF 1.0, which need not state a version.
+bool has_named_nodes(std::string_view bytes) {
+  const auto nodes = Json::parse(bytes).find("nodes");
+  return nodes && !nodes->is_array() && !nodes->keys().empty();
+}
+
 /// Refuses glTF 1.0 and required extensions that are not read. gltf: may be half read.
 Result<void> require_support(const tinygltf::Model& gltf, std::string_view bytes,
                              const std::string& path) {
-  const bool old_binary = bytes.starts_with("glTF") && bytes.size() > 4 && bytes[4] == 1;
-  if (old_binary || gltf.asset.version.starts_with("1")) {
+  const bool binary = bytes.starts_with("glTF");
+  const bool old_binary = binary && bytes.size() > 4 && bytes[4] == 1;
+  if (old_binary || gltf.asset.version.starts_with("1") || (!binary && has_named_nodes(bytes))) {
     return fail(ExitCode::kUnsupported, "gltf.version", path, "this is glTF 1.0",
                 "convert it to glTF 2.0, for instance with Blender or gltf-pipeline");
   }

@@ -531,11 +531,12 @@ void forget_mean_colours(const std::string& label, SourceModel& model) {
     ++count;
   }
   if (count == 0) return;
-  model.diagnostics.push_back(
-      {"mtl.mean-colour", DiagnosticSeverity::kInfo, label, 0,
-       std::to_string(count) + " materials have the mean of their texture as their colour (Kd), "
-                               "which is not multiplied",
-       ""});
+  model.diagnostics.push_back({"mtl.mean-colour", DiagnosticSeverity::kInfo, label, 0,
+                               std::to_string(count) +
+                                   (count == 1 ? " material has" : " materials have") +
+                                   " the mean of the texture as the colour (Kd), "
+                                   "which is not multiplied",
+                               ""});
 }
 
 std::string folder_of(const std::string& path) {

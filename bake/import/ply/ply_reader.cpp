@@ -461,8 +461,12 @@ Result<SourceModel> parse(std::string_view bytes, const ModelFolder& folder,
   MODAR_ASSIGN(const PlyHeader header, parse_ply_header(bytes, label));
   MODAR_ASSIGN(SourceModel model, PlyReader(bytes, header, label).run());
   model.name = std::filesystem::path(label).stem().string();
-  if (const auto up = up_in_comments(bytes.substr(0, header.bytes))) {
+  const std::string_view head = bytes.substr(0, header.bytes);
+  if (const auto up = up_in_comments(head)) {
     model.up = {*up, UpReason::kHeader};
+  } else if (head.find("comment Created by Blender") != std::string_view::npos ||
+             head.find("comment Created in Blender") != std::string_view::npos) {
+    model.up = {UpAxis::kZ, UpReason::kHeader};  // as its exporter writes by default
   }
   add_materials(header, folder, label, options.own_picture, model);
   return model;

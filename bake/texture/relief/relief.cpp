@@ -572,8 +572,9 @@ Result<void> draw_relief(TriMesh& mesh, const ReliefOptions& options, Report& re
   if (drawn == 0) return {};
   report.diagnostics.push_back({"model.normal-map", DiagnosticSeverity::kInfo, mesh.name, 0,
                                 std::to_string(drawn) +
-                                    " materials have a normal map; their base colour shows it as "
-                                    "relief in the light of a neutral room",
+                                    (drawn == 1 ? " material has" : " materials have") +
+                                    " a normal map; the base colour shows it as relief in the "
+                                    "light of a neutral room",
                                 ""});
   return {};
 }
