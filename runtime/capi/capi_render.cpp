@@ -83,7 +83,7 @@ modar::CameraPicture picture_of(const modar_picture& theirs, std::vector<std::ui
   std::copy_n(picture.planes, ours.planes.size(), ours.planes.begin());
   std::copy_n(picture.strides, ours.strides.size(), ours.strides.begin());
   ours.full_range = picture.full_range != 0;
-  if (picture.row_count > 0) {
+  if (picture.row_count != 0) {
     ours.first_row = picture.first_row;
     ours.row_count = picture.row_count;
   }

@@ -248,6 +248,10 @@ std::string summary_line(const RunStats& stats) {
       });
       reasons(writer, stats);
       count(writer, "late", stats.late());
+      object(writer, "uploads", [&] {
+        count(writer, "bytes", stats.uploads().bytes);
+        count(writer, "same", stats.uploads().same);
+      });
       if (stats.camera()) camera(writer, *stats.camera());
       times(writer, stats.median_ms());
     });

@@ -78,14 +78,22 @@ inline constexpr std::array<Reason, 9> kReasons = {
 /// A frame whose picture comes later than this after the frame itself is late (30 frames a second).
 inline constexpr double kFrameBudgetMs = 1000.0 / 30.0;
 
+/// Bytes of pictures on their way to GL.
+struct UploadCounts {
+  std::uint64_t bytes = 0;
+  std::uint64_t same = 0;  ///< not uploaded: GL has them from the picture before
+};
+
 class RunStats {
  public:
   void add(const FrameReport& report);
   void set_dropped(std::uint64_t dropped) { dropped_ = dropped; }
   void set_skipped(std::uint64_t skipped) { skipped_ = skipped; }
+  void set_uploads(const UploadCounts& uploads) { uploads_ = uploads; }
 
   [[nodiscard]] std::uint64_t frames() const { return times_.size(); }
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }
+  [[nodiscard]] const UploadCounts& uploads() const { return uploads_; }
   /// Pictures that cannot be read.
   [[nodiscard]] std::uint64_t skipped() const { return skipped_; }
   [[nodiscard]] std::uint64_t visible() const { return visible_; }  ///< frames with a detection
@@ -113,6 +121,7 @@ class RunStats {
   std::uint64_t late_ = 0;
   std::uint64_t dropped_ = 0;
   std::uint64_t skipped_ = 0;
+  UploadCounts uploads_;
   std::optional<CameraReport> camera_;
 };
 

@@ -116,7 +116,7 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle, const
   catch_interrupts();
   // With --live, a bundle that is written to is opened again.
   const auto intact = [&] { return options.live ? Result<void>() : file.intact(); };
-  const auto show = [&](const Job& job) -> Result<bool> {
+  const auto show = [&](Job& job) -> Result<bool> {
     MODAR_TRY(intact());
     return player.show(job);
   };

@@ -152,7 +152,7 @@ struct Job {
 /// Runs on the vision thread: fills camera, track and track_ms.
 using TrackStep = std::function<Result<void>(Job&)>;
 /// Runs on the caller's thread. Answers false to end the run.
-using ShowStep = std::function<Result<bool>(const Job&)>;
+using ShowStep = std::function<Result<bool>(Job&)>;
 /// Runs on the caller's thread while no frame comes, to keep a window alive. False ends the run.
 using IdleStep = std::function<bool()>;
 

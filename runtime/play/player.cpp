@@ -150,7 +150,7 @@ Result<void> Player::open_logs() {
   return {};
 }
 
-Result<bool> Player::show(const Job& job) {
+Result<bool> Player::show(Job& job) {
   MODAR_TRY(screen_->resize(job.frame.width, job.frame.height));
   MODAR_TRY(follow_live(job));
   follow_spot(job);
@@ -181,6 +181,8 @@ Result<bool> Player::show(const Job& job) {
   rate_.add(now_ns());
   progress_.step(stats_.frames(), setup_.source.frames, stats_.visible());
   MODAR_TRY(hold(job));
+  stats_.set_uploads(screen_->uploads());
+  std::swap(shown_, job.frame);
   return idle();
 }
 
@@ -289,9 +291,9 @@ void Player::draw(const Job& job, const FrameReport& report) {
   constexpr Colour kOutline{64, 255, 96};
   constexpr Colour kExtended{255, 176, 32};
   if (!controls_.outline() || report.visible.empty()) {
-    return screen_->draw(job.frame.picture(), job.camera, items_);
+    return screen_->draw(job.frame.picture(), job.camera, items_, shown_.picture());
   }
-  screen_->draw(job.frame.picture(), job.camera, {});
+  screen_->draw(job.frame.picture(), job.camera, {}, shown_.picture());
   screen_->picture();
   const Canvas canvas = screen_->canvas();
   for (const Detection& seen : report.visible) {

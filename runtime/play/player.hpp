@@ -57,8 +57,9 @@ class Player {
   /// Compares each frame with this recording.
   void compare(GoldenCheck golden) { golden_ = std::move(golden); }
 
-  /// Shows one frame. Answers false once the user ended the run.
-  Result<bool> show(const Job& job);
+  /// Shows one frame, and leaves an older one in the job. Answers false once the user ended the
+  /// run.
+  Result<bool> show(Job& job);
   /// Takes what the user did. Answers false once the user ended the run.
   bool idle();
   /// Completes every output; answers the program's exit code.
@@ -104,6 +105,7 @@ class Player {
   RateMeter rate_;
   RunStats stats_;
   std::unique_ptr<Screen> screen_;
+  Frame shown_;                        ///< the frame before
   std::unique_ptr<SceneMedia> media_;  ///< null: the bundle has none, or this build plays none
   std::vector<std::unique_ptr<FrameSink>> sinks_;
   std::unique_ptr<Recorder> recorder_;

@@ -2,6 +2,7 @@
 #include "screen.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 #include <GLES2/gl2.h>
 
@@ -73,15 +74,55 @@ Result<void> Screen::resize(int width, int height) {
   return {};
 }
 
+namespace {
+
+CameraPicture picture_of(const RgbImage& image) {
+  CameraPicture picture;
+  picture.width = image.width;
+  picture.height = image.height;
+  picture.planes[0] = image.pixels;
+  picture.strides[0] = image.stride;
+  return picture;
+}
+
+}  // namespace
+
+void keep_changed_rows(const CameraPicture& before, CameraPicture& now) {
+  if (before.width != now.width || before.height != now.height || before.format != now.format) {
+    return;
+  }
+  const auto same = [&](int row) {
+    for (std::size_t p = 0; p < now.planes.size() && now.planes[p] != nullptr; ++p) {
+      const std::ptrdiff_t stride = now.strides[p];
+      const std::ptrdiff_t at = stride * (p == 0 ? row : row / 2);
+      if (std::memcmp(before.planes[p] + at, now.planes[p] + at,
+                      static_cast<std::size_t>(stride)) != 0) {
+        return false;
+      }
+    }
+    return true;
+  };
+  int end = now.height;
+  while (end > 0 && same(end - 1)) --end;
+  now.first_row = 0;
+  while (now.first_row < end && same(now.first_row)) ++now.first_row;
+  now.row_count = end - now.first_row;
+}
+
 void Screen::draw(const CameraPicture& background, const Camera& camera,
-                  std::span<const DrawItem> items) {
+                  std::span<const DrawItem> items, const CameraPicture& before) {
+  CameraPicture shown = background;
+  if (!painted_) keep_changed_rows(before, shown);
+  painted_ = false;
   glm::mat4 projection(1.0f);
   if (!items.empty()) {
     const DepthRange range = depth_range(bundle_, items);
     projection = gl_projection(camera, range.near_plane, range.far_plane);
   }
-  renderer_->render(background, projection, items);
+  renderer_->render(shown, projection, items);
   stats_ = renderer_->stats();
+  uploads_.bytes += stats_.bytes_uploaded;
+  uploads_.same += stats_.bytes_same;
 }
 
 bool Screen::has_video(std::uint32_t node) const {
@@ -95,7 +136,7 @@ void Screen::show_video(std::uint32_t node, const RgbImage& image) {
   auto video = std::find_if(videos_.begin(), videos_.end(),
                             [node](const Video& each) { return each.node == node; });
   if (video == videos_.end()) {
-    video = videos_.insert(videos_.end(), Video{node, 0});
+    video = videos_.insert(videos_.end(), Video{node, 0, {}, {}});
     glGenTextures(1, &video->texture);
     glBindTexture(GL_TEXTURE_2D, video->texture);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
@@ -106,8 +147,27 @@ void Screen::show_video(std::uint32_t node, const RgbImage& image) {
   }
   glBindTexture(GL_TEXTURE_2D, video->texture);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB, image.width, image.height, 0, GL_RGB, GL_UNSIGNED_BYTE,
-               image.pixels);
+  CameraPicture& last = video->picture;
+  CameraPicture now = picture_of(image);
+  keep_changed_rows(last, now);
+  const auto row = static_cast<std::size_t>(image.stride);
+  const std::size_t first = static_cast<std::size_t>(now.first_row) * row;
+  std::size_t bytes = static_cast<std::size_t>(image.height) * row;
+  if (now.row_count <= now.height) {
+    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, now.first_row, now.width, now.row_count, GL_RGB,
+                    GL_UNSIGNED_BYTE, image.pixels + first);
+    uploads_.same += bytes;
+    bytes = static_cast<std::size_t>(now.row_count) * row;
+    uploads_.same -= bytes;
+  } else {
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB, image.width, image.height, 0, GL_RGB, GL_UNSIGNED_BYTE,
+                 image.pixels);
+    video->pixels.resize(bytes);
+  }
+  uploads_.bytes += bytes;
+  std::copy_n(image.pixels + first, bytes, video->pixels.data() + first);
+  last = now;
+  last.planes[0] = video->pixels.data();
   glBindTexture(GL_TEXTURE_2D, static_cast<GLuint>(bound));
 }
 
@@ -133,13 +193,8 @@ RgbImage Screen::canvas_picture() {
 }
 
 void Screen::draw_on_canvas(const Camera& camera, std::span<const DrawItem> items) {
-  const RgbImage image = canvas_picture();
-  CameraPicture painted;
-  painted.width = image.width;
-  painted.height = image.height;
-  painted.planes[0] = image.pixels;
-  painted.strides[0] = image.stride;
-  draw(painted, camera, items);
+  draw(picture_of(canvas_picture()), camera, items);
+  painted_ = true;
 }
 
 void Screen::present() {
@@ -151,6 +206,7 @@ void Screen::present() {
 void Screen::present_canvas() {
   if (!window_) return;
   renderer_->render(canvas_picture(), glm::mat4(1.0f), {});
+  painted_ = true;
   present();
 }
 

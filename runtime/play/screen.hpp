@@ -11,6 +11,7 @@
 #include "controls.hpp"
 #include "formats/base/error.hpp"
 #include "formats/bundle_view.hpp"
+#include "frame_report.hpp"
 #include "frame_sink.hpp"
 #include "modar/camera.hpp"
 #include "modar/gl_context.hpp"
@@ -53,6 +54,10 @@ class Window {
   std::unique_ptr<State> state_;
 };
 
+/// Leaves out of `now` the rows at its top and bottom that are the same in `before`. The rows of
+/// both have no padding.
+void keep_changed_rows(const CameraPicture& before, CameraPicture& now);
+
 class Screen {
  public:
   /// Opens the context that the options ask for on this thread, and uploads the bundle. Its bytes
@@ -68,8 +73,11 @@ class Screen {
   /// Sets the picture's size; nothing happens where it stands already. Where the window's context
   /// was lost, makes everything anew in another one first.
   Result<void> resize(int width, int height);
-  /// Draws the background and the items as the camera sees them.
-  void draw(const CameraPicture& background, const Camera& camera, std::span<const DrawItem> items);
+  /// Draws the background and the items as the camera sees them. before: the background of the draw
+  /// before this one, whose pixels are still there, or one without a size: rows that are the same
+  /// are not uploaded again.
+  void draw(const CameraPicture& background, const Camera& camera, std::span<const DrawItem> items,
+            const CameraPicture& before = {});
   /// The same over the painted canvas.
   void draw_on_canvas(const Camera& camera, std::span<const DrawItem> items);
   /// What a video's node shows from now on, instead of its poster. The pixels are copied.
@@ -90,6 +98,8 @@ class Screen {
   std::span<const UserAct> acts(std::chrono::milliseconds limit);
 
   [[nodiscard]] const RenderStats& stats() const { return stats_; }  ///< of the last draw()
+  /// Bytes of frames and videos so far.
+  [[nodiscard]] const UploadCounts& uploads() const { return uploads_; }
   [[nodiscard]] GpuMemory gpu_memory() const { return renderer_->gpu_memory(); }
   [[nodiscard]] const GlCaps& caps() const { return caps_; }
 
@@ -106,12 +116,16 @@ class Screen {
   std::unique_ptr<Renderer> renderer_;  ///< goes before its context
   GlCaps caps_;
   RenderStats stats_;
+  UploadCounts uploads_;
+  bool painted_ = false;  ///< a canvas was uploaded since the last draw()
   std::vector<std::uint8_t> rgba_;
   std::vector<std::uint8_t> rgb_;  ///< of the canvas, on its way to the window
   /// Of a video's node.
   struct Video {
     std::uint32_t node = 0;
     unsigned texture = 0;
+    CameraPicture picture;  ///< of pixels
+    std::vector<std::uint8_t> pixels;
   };
   std::vector<Video> videos_;
   int width_ = 0;

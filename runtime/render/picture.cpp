@@ -137,8 +137,8 @@ Layouts layouts_of(PictureFormat format) {
 }
 
 /// Rows [first, end) of a plane, full width, into the bound texture.
-std::uint64_t send_rows(const PlaneLayout& layout, const std::uint8_t* pixels,
-                        std::ptrdiff_t stride, int width, int first, int end) {
+void send_rows(const PlaneLayout& layout, const std::uint8_t* pixels, std::ptrdiff_t stride,
+               int width, int first, int end) {
   const std::uint8_t* start = pixels + first * stride;
   if (stride == std::ptrdiff_t{layout.bytes} * width) {
     glTexSubImage2D(GL_TEXTURE_2D, 0, 0, first, width, end - first, layout.format, GL_UNSIGNED_BYTE,
@@ -149,8 +149,6 @@ std::uint64_t send_rows(const PlaneLayout& layout, const std::uint8_t* pixels,
       glTexSubImage2D(GL_TEXTURE_2D, 0, 0, y, width, 1, layout.format, GL_UNSIGNED_BYTE, start);
     }
   }
-  return static_cast<std::uint64_t>(layout.bytes) * static_cast<std::uint64_t>(width) *
-         static_cast<std::uint64_t>(end - first);
 }
 
 }  // namespace
@@ -221,7 +219,7 @@ void Background::allocate(const CameraPicture& picture, GlState& gl) {
   }
 }
 
-std::uint64_t Background::upload(const CameraPicture& picture, GlState& gl) {
+void Background::upload(const CameraPicture& picture, GlState& gl, RenderStats& stats) {
   const bool same =
       picture.width == width_ && picture.height == height_ && picture.format == format_;
   if (!same) allocate(picture, gl);
@@ -229,16 +227,20 @@ std::uint64_t Background::upload(const CameraPicture& picture, GlState& gl) {
   const int first = same ? std::clamp(picture.first_row, 0, height_) : 0;
   const int count = same ? std::clamp(picture.row_count, 0, height_ - first) : height_;
   const Layouts layouts = layouts_of(format_);
-  std::uint64_t bytes = 0;
-  for (int i = 0; i < layouts.count && count > 0; ++i) {
+  for (int i = 0; i < layouts.count; ++i) {
     const std::size_t p = static_cast<std::size_t>(i);
     const int divider = layouts.planes[p].divider;
+    const int width = (width_ + divider - 1) / divider;
+    const int rows = (height_ + divider - 1) / divider;
+    const int start = count > 0 ? first / divider : 0;
+    const int end = count > 0 ? (first + count + divider - 1) / divider : 0;
+    const auto row = static_cast<std::uint64_t>(layouts.planes[p].bytes * width);
+    stats.bytes_uploaded += row * static_cast<std::uint64_t>(end - start);
+    stats.bytes_same += row * static_cast<std::uint64_t>(rows - (end - start));
+    if (start == end) continue;
     gl.edit_texture(static_cast<GLuint>(i), planes_[p].texture);
-    bytes += send_rows(layouts.planes[p], picture.planes[p], picture.strides[p],
-                       (width_ + divider - 1) / divider, first / divider,
-                       (first + count + divider - 1) / divider);
+    send_rows(layouts.planes[p], picture.planes[p], picture.strides[p], width, start, end);
   }
-  return bytes;
 }
 
 /// Luma and RGB are taken unchanged where a texel is a pixel; chroma is always interpolated.

@@ -57,9 +57,9 @@ class Background {
   Result<void> create();
   void release(GlState& gl);
 
-  /// Sends the picture's changed rows to its textures: bytes sent. Textures are made anew where
+  /// Sends the picture's changed rows to its textures, and counts. Textures are made anew where
   /// size or format change.
-  std::uint64_t upload(const CameraPicture& picture, GlState& gl);
+  void upload(const CameraPicture& picture, GlState& gl, RenderStats& stats);
   /// Fills the viewport with the picture sent last; exact: a texel is a pixel there. Answers the
   /// draw calls: none where the driver cannot link the format's shader.
   int draw(bool exact, const TextureMap& map, GlState& gl);

@@ -529,7 +529,7 @@ void Renderer::render(const CameraPicture& background, const glm::mat4& projecti
   if (shown) {
     const DebugGroup group(s.extensions, "camera picture");
     const bool exact = view.width == background.width && view.height == background.height;
-    s.stats.bytes_uploaded += s.background.upload(background, s.gl);
+    s.background.upload(background, s.gl, s.stats);
     s.stats.draw_calls += s.background.draw(exact, {}, s.gl);
     if (s.options.estimate_light) s.estimator.observe(background, projection, items);
   }
@@ -556,7 +556,7 @@ void Renderer::draw(const SurfaceView& surface, const CameraPicture& frame,
     const DebugGroup group(s.extensions, "camera picture");
     const bool exact =
         turn == glm::mat2(1.0f) && view.width == frame.width && view.height == frame.height;
-    s.stats.bytes_uploaded += s.background.upload(frame, s.gl);
+    s.background.upload(frame, s.gl, s.stats);
     s.stats.draw_calls += s.background.draw(exact, texture_map(turn), s.gl);
     if (s.options.estimate_light) s.estimator.observe(frame, projection, items);
   }
@@ -627,7 +627,8 @@ const RenderStats& Renderer::stats() const {
 GpuMemory Renderer::gpu_memory() const {
   return {state_->geometry.resident_bytes(), state_->textures.bytes(),
           state_->painter.batch_bytes(),
-          state_->geometry.uploaded_bytes() + state_->textures.uploaded_bytes()};
+          state_->geometry.uploaded_bytes() + state_->textures.uploaded_bytes(),
+          state_->textures.kept_bytes()};
 }
 
 }  // namespace modar

@@ -12,6 +12,8 @@
 namespace modar {
 namespace {
 
+constexpr std::uint64_t kEtc1Block = 8;  ///< bytes of 4x4 texels
+
 bool power_of_two(const TextureRecord& texture) {
   return is_power_of_two(texture.width) && is_power_of_two(texture.height);
 }
@@ -22,6 +24,7 @@ TextureStore::TextureStore(const BundleView& bundle, const GlCaps& caps)
     : bundle_(bundle),
       formats_(caps.texture_formats),
       etc1_format_(caps.etc1_format),
+      etc1_in_parts_(caps.etc1_sub_texture),
       npot_mipmaps_(caps.npot_mipmaps),
       max_side_(static_cast<std::uint32_t>(caps.max_texture_size)) {
   const std::uint32_t count = bundle.textures().size();
@@ -248,25 +251,89 @@ void TextureStore::put(std::uint32_t texture, std::uint64_t offset,
 void TextureStore::take(std::uint32_t texture, GLuint name, std::uint32_t level, std::uint64_t at,
                         std::span<const std::byte> bytes) {
   const TextureRecord& record = bundle_.textures()[texture];
-  const std::uint64_t size = bundle_.texture_levels()[record.first_level + level].size;
+  const TextureLevelRecord& target = bundle_.texture_levels()[record.first_level + level];
+  glBindTexture(GL_TEXTURE_2D, name);
+  if (bytes.size() == target.size) return send(texture, level, bytes);
+  const bool in_place = etc1_in_parts_ && reads(record) &&
+                        record.format == static_cast<std::uint32_t>(TextureFormat::kEtc1Rgb);
   auto pending = std::find_if(pending_.begin(), pending_.end(), [&](const PendingUpload& each) {
     return each.name == name && each.level == level;
   });
-  std::span<const std::byte> blocks = bytes;
-  if (bytes.size() < size) {
-    if (pending == pending_.end()) {
-      pending = pending_.insert(pending_.end(), PendingUpload{name, level, 0, {}});
-      pending->bytes.resize(static_cast<std::size_t>(size));
+  if (pending == pending_.end()) {
+    pending = pending_.insert(pending_.end(), PendingUpload{name, level, 0, {}, {}});
+    if (in_place) {
+      // ES 2.0 names no way to make the level without its bytes.
+      decoded_.resize(static_cast<std::size_t>(target.size));
+      send(texture, level, std::as_bytes(std::span(decoded_)));
+    } else {
+      pending->bytes.resize(static_cast<std::size_t>(target.size));
     }
-    std::copy(bytes.begin(), bytes.end(), pending->bytes.begin() + static_cast<std::ptrdiff_t>(at));
-    pending->came += bytes.size();
-    if (pending->came < size) return;
-    blocks = pending->bytes;
   }
-  glBindTexture(GL_TEXTURE_2D, name);
-  send(texture, level, blocks);
-  if (pending != pending_.end()) pending_.erase(pending);
+  pending->came += bytes.size();
+  if (in_place) {
+    take_in_place(target, static_cast<GLint>(level - first_level_[texture]), *pending, at, bytes);
+  } else {
+    std::copy(bytes.begin(), bytes.end(), pending->bytes.begin() + static_cast<std::ptrdiff_t>(at));
+    if (pending->came == target.size) send(texture, level, pending->bytes);
+  }
+  if (pending->came == target.size) pending_.erase(pending);
   decoded_ = {};
+}
+
+void TextureStore::take_in_place(const TextureLevelRecord& level, GLint target_level,
+                                 PendingUpload& pending, std::uint64_t at,
+                                 std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const std::uint64_t block = at / kEtc1Block;
+    const std::uint64_t start = at % kEtc1Block;
+    std::size_t count = bytes.size() / kEtc1Block * kEtc1Block;
+    if (start == 0 && count > 0) {
+      send_blocks(level, target_level, block, bytes.first(count));
+    } else {
+      count = std::min(static_cast<std::size_t>(kEtc1Block - start), bytes.size());
+      const auto found = std::find(pending.cut.begin(), pending.cut.end(), block);
+      const auto place = static_cast<std::size_t>(found - pending.cut.begin()) * kEtc1Block;
+      if (found == pending.cut.end()) {
+        pending.cut.push_back(block);
+        pending.bytes.resize(place + kEtc1Block);
+      }
+      const std::span<std::byte> whole = std::span(pending.bytes).subspan(place, kEtc1Block);
+      std::copy_n(bytes.begin(), count, whole.begin() + static_cast<std::ptrdiff_t>(start));
+      send_blocks(level, target_level, block, whole);
+    }
+    at += count;
+    bytes = bytes.subspan(count);
+  }
+}
+
+void TextureStore::send_blocks(const TextureLevelRecord& level, GLint target_level,
+                               std::uint64_t first, std::span<const std::byte> blocks) {
+  const std::uint64_t a_row = (level.width + 3) / 4;
+  uploaded_bytes_ += blocks.size();
+  while (!blocks.empty()) {
+    const std::uint64_t count = blocks.size() / kEtc1Block;
+    const std::uint64_t column = first % a_row;
+    const std::uint64_t across = std::min(count, a_row - column);
+    const std::uint64_t down = across == a_row ? count / a_row : 1;
+    const auto x = static_cast<GLint>(4 * column);
+    const auto y = static_cast<GLint>(4 * (first / a_row));
+    const auto size = static_cast<std::size_t>(across * down * kEtc1Block);
+    glCompressedTexSubImage2D(
+        GL_TEXTURE_2D, target_level, x, y,
+        std::min(static_cast<GLsizei>(4 * across), static_cast<GLsizei>(level.width) - x),
+        std::min(static_cast<GLsizei>(4 * down), static_cast<GLsizei>(level.height) - y),
+        etc1_format_, static_cast<GLsizei>(size), blocks.data());
+    first += across * down;
+    blocks = blocks.subspan(size);
+  }
+}
+
+std::uint64_t TextureStore::kept_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const PendingUpload& each : pending_) {
+    bytes += each.bytes.size();
+  }
+  return bytes;
 }
 
 void TextureStore::release(GlState& gl) {

@@ -30,8 +30,9 @@ class TextureStore {
   std::uint32_t want(std::uint64_t& offset, std::uint64_t& size);
   /// All bytes of what want() named were put(): it is drawn from now on.
   void have();
-  /// Bytes of a texture's section from `offset` on. A level is uploaded when its last byte is here;
-  /// until then its bytes are kept, each of which comes once.
+  /// Bytes of a texture's section from `offset` on, each of which comes once. Where the context
+  /// takes parts of ETC1 textures they are uploaded to their place; else a level's bytes are kept
+  /// until its last one is here.
   void put(std::uint32_t texture, std::uint64_t offset, std::span<const std::byte> bytes);
   void release(GlState& gl);
 
@@ -40,6 +41,8 @@ class TextureStore {
   [[nodiscard]] GLuint alpha(std::uint32_t texture) const { return alphas_[texture]; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   [[nodiscard]] std::uint64_t uploaded_bytes() const { return uploaded_bytes_; }
+  /// Of levels that have come in part: kept in memory.
+  [[nodiscard]] std::uint64_t kept_bytes() const;
 
  private:
   /// Whether the context reads the texture's blocks; else they are decoded to RGB.
@@ -63,15 +66,24 @@ class TextureStore {
     GLuint name = 0;
     std::uint32_t level = 0;
     std::uint64_t came = 0;
-    std::vector<std::byte> bytes;
+    std::vector<std::byte> bytes;    ///< of the level, or of the blocks `cut`
+    std::vector<std::uint64_t> cut;  ///< in place: numbers of blocks that came in two pieces
   };
   /// Some bytes of a level from `at` on, of its texture `name`.
   void take(std::uint32_t texture, GLuint name, std::uint32_t level, std::uint64_t at,
             std::span<const std::byte> bytes);
 
+  /// The same into the bound texture, which has that level.
+  void take_in_place(const TextureLevelRecord& level, GLint target_level, PendingUpload& pending,
+                     std::uint64_t at, std::span<const std::byte> bytes);
+  /// Whole blocks from number `first` on, in rows.
+  void send_blocks(const TextureLevelRecord& level, GLint target_level, std::uint64_t first,
+                   std::span<const std::byte> blocks);
+
   const BundleView& bundle_;
   std::uint32_t formats_ = 0;  ///< as in GlCaps
   GLenum etc1_format_ = 0;
+  bool etc1_in_parts_ = false;
   bool npot_mipmaps_ = false;
   std::uint32_t max_side_ = 64;
   std::vector<bool> used_;

@@ -148,6 +148,50 @@ TEST_F(WindowTest, ALostContextIsMadeAnewAndShowsTheSame) {
   }
 }
 
+/// A film that stands still but for some rows, next to the same without the frame before.
+TEST(ScreenTest, RowsThatAreTheSameAreNotUploadedAgain) {
+  BundleContent content;
+  content.meta = "{}";
+  const std::vector<std::byte> bytes = encode_bundle(content).value();
+  const BundleView bundle = BundleView::open(bytes).value();
+  const PlayOptions options;
+  auto screen = Screen::open(bundle, options);
+  if (!screen) GTEST_SKIP() << to_line(screen.error());
+  const auto frame = [](int changed) {
+    Frame made;
+    made.width = 16;
+    made.height = 12;
+    made.format = PictureFormat::kNv12;
+    for (int i = 0; i < 16 * 18; ++i)
+      made.yuv.push_back(static_cast<std::uint8_t>(40 + 7 * i % 150));
+    for (int i = 0; i < 32; ++i) made.yuv[static_cast<std::size_t>(16 * changed + i)] ^= 0x1f;
+    return made;
+  };
+  const auto shown = [&](const Frame& now, const Frame& before) {
+    EXPECT_TRUE((*screen)->resize(16, 12));
+    const UploadCounts so_far = (*screen)->uploads();
+    (*screen)->draw(now.picture(), default_camera(16, 12), {}, before.picture());
+    const UploadCounts after = (*screen)->uploads();
+    EXPECT_EQ(after.bytes + after.same - so_far.bytes - so_far.same, 16u * 18);
+    const RgbaView seen = (*screen)->picture();
+    return std::pair(std::vector<std::uint8_t>(seen.pixels.begin(), seen.pixels.end()),
+                     after.bytes - so_far.bytes);
+  };
+  const auto whole = shown(frame(4), {});
+  EXPECT_EQ(whole.second, 16u * 18);
+  EXPECT_EQ(shown(frame(8), frame(4)).second, 6u * 16 + 3u * 16) << "rows 4 to 9";
+  const auto back = shown(frame(4), frame(8));
+  EXPECT_EQ(back.second, 6u * 16 + 3u * 16);
+  EXPECT_EQ(back.first, whole.first);
+  EXPECT_EQ(shown(frame(4), frame(4)).second, 0u);
+  // The last rows of chroma, which four rows of luma show.
+  EXPECT_EQ(shown(frame(16), frame(4)).second, 8u * 16 + 4u * 16);
+  (*screen)->draw_on_canvas(default_camera(16, 12), {});
+  const UploadCounts painted = (*screen)->uploads();
+  (*screen)->draw(frame(4).picture(), default_camera(16, 12), {}, frame(4).picture());
+  EXPECT_EQ((*screen)->uploads().bytes - painted.bytes, 16u * 18) << "the canvas was there";
+}
+
 TEST_F(WindowTest, WaitsNoLongerThanItIsTold) {
   const auto start = std::chrono::steady_clock::now();
   EXPECT_TRUE(window_->acts(milliseconds(30)).empty());

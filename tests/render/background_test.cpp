@@ -190,6 +190,7 @@ TEST_F(BackgroundTest, OnlyChangedRowsAreSent) {
   }
   // Four rows of luma, and the three rows of pairs that they are in.
   EXPECT_EQ(renderer_->stats().bytes_uploaded, 4u * 32 + 3u * 32);
+  EXPECT_EQ(renderer_->stats().bytes_same, 20u * 32 + 9u * 32);
   made.picture.row_count = 0;
   EXPECT_TRUE(after == show(*renderer_, made.picture));
   EXPECT_EQ(renderer_->stats().bytes_uploaded, 0u);

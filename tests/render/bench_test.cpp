@@ -52,6 +52,9 @@ TEST(RenderBench, TellsWhatEachWayCosts) {
   EXPECT_GE(sent, 3.0 * kTriangles * 3 * (12 + 2));
   EXPECT_LE(value(*rows, "model x3 instancing_vbo bytes_per_frame", false), sent / 10);
   EXPECT_EQ(value(*rows, bundle.path + " gl_geometry_bytes", false), kTriangles * 3.0 * (12 + 2));
+  EXPECT_EQ(value(*rows, bundle.path + " arrival draw_calls", false), 1);
+  EXPECT_EQ(value(*rows, bundle.path + " arrival uploaded_bytes", true),
+            kTriangles * 3.0 * (12 + 2));
   // From its middle, 12 of the 14 views have the one flat chunk before them (the two along z look
   // away from it), and need a part of it.
   EXPECT_EQ(value(*rows, "model inside triangles_sent", false), 12.0 * kTriangles);

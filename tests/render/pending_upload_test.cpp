@@ -116,16 +116,56 @@ TEST_F(ComingTest, IsDrawnAsIfItWereInMemory) {
   ASSERT_FALSE(std::equal(whole.begin(), whole.end(), bytes.begin())) << "something passes by";
   // Pieces that end within a vertex, a block, a level; and all of it at once.
   for (const std::size_t piece : {std::size_t{7}, std::size_t{101}, whole.size()}) {
-    auto renderer = Renderer::create_part(memory.view, probe_gl_caps(), Renderer::Part::kComes);
-    ASSERT_TRUE(renderer) << renderer.error().cause;
-    for (std::size_t at = static_cast<std::size_t>(start); at < whole.size(); at += piece) {
-      (*renderer)->put(at, whole.subspan(at, std::min(piece, whole.size() - at)));
+    for (const bool in_place : {false, true}) {
+      GlCaps caps = probe_gl_caps();
+      caps.etc1_sub_texture = caps.etc1_sub_texture && in_place;
+      auto renderer = Renderer::create_part(memory.view, caps, Renderer::Part::kComes);
+      ASSERT_TRUE(renderer) << renderer.error().cause;
+      for (std::size_t at = static_cast<std::size_t>(start); at < whole.size(); at += piece) {
+        (*renderer)->put(at, whole.subspan(at, std::min(piece, whole.size() - at)));
+      }
+      EXPECT_TRUE(picture(**renderer) == wanted) << piece << ", in place " << in_place;
+      EXPECT_EQ((*renderer)->gpu_memory().kept, 0u);
     }
-    EXPECT_TRUE(picture(**renderer) == wanted) << piece;
   }
   auto empty = Renderer::create_part(memory.view, probe_gl_caps(), Renderer::Part::kComes);
   ASSERT_TRUE(empty);
   EXPECT_FALSE(picture(**empty) == wanted);
+}
+
+/// Blocks of a texture whose finest level the context is too small for, in pieces from the last to
+/// the first: little is kept in memory meanwhile, and the picture is the same.
+TEST_F(ComingTest, PartsOfATextureGoToTheirPlace) {
+  if (!probe_gl_caps().etc1_sub_texture) GTEST_SKIP() << "the driver updates no part of ETC1";
+  const MappedBundle bundle(two_kinds(256));
+  const auto whole = bundle.file.bytes();
+  Memory memory(whole);
+  GlCaps caps = probe_gl_caps();
+  constexpr std::uint64_t kLevel = 32 * 32 * 8;  // of 128 texels
+  caps.max_texture_size = 128;
+  const std::unique_ptr<Renderer> usual = make_renderer(*bundle.view, caps);
+  ASSERT_TRUE(usual);
+  ASSERT_LT(usual->gpu_memory().textures, 4 * kLevel) << "without the finest level";
+  const std::vector<std::uint8_t> wanted = picture(*usual);
+  for (const bool in_place : {false, true}) {
+    caps.etc1_sub_texture = in_place;
+    auto renderer = Renderer::create_part(memory.view, caps, Renderer::Part::kComes);
+    ASSERT_TRUE(renderer) << renderer.error().cause;
+    constexpr std::size_t kPiece = 1001;
+    std::uint64_t kept = 0;
+    for (std::size_t at = whole.size() / kPiece * kPiece + kPiece; at > 0; at -= kPiece) {
+      const std::size_t from = at - kPiece;
+      if (from < whole.size())
+        (*renderer)->put(from, whole.subspan(from).first(std::min(kPiece, whole.size() - from)));
+      kept = std::max(kept, (*renderer)->gpu_memory().kept);
+    }
+    EXPECT_TRUE(picture(**renderer) == wanted) << "in place " << in_place;
+    if (in_place) {
+      EXPECT_LT(kept, kLevel / 2);
+    } else {
+      EXPECT_GE(kept, kLevel);
+    }
+  }
 }
 
 TEST_F(ComingTest, VerticesThatWouldBeRewrittenAreRefused) {

@@ -469,6 +469,38 @@ Result<void> add_load(const BenchStage& stage, const std::string& path, Rows& ro
   return {};
 }
 
+/// A bundle that comes in pieces, its textures in place and, as the reference, level by level.
+void add_arrival(const BenchStage& stage, const std::string& path,
+                 const RenderBenchOptions& options, Rows& rows) {
+  constexpr std::size_t kPiece = 65536;
+  const std::vector<DrawItem> items = grid(0, 1);
+  struct Figures {
+    double bytes = -1, kept = -1, draw_calls = -1;
+  };
+  const auto measured = [&](bool in_place) -> Figures {
+    GlCaps caps = stage.caps;
+    caps.etc1_sub_texture = caps.etc1_sub_texture && in_place;
+    const auto renderer = Renderer::create_part(stage.bundle, caps, Renderer::Part::kComes);
+    if (!renderer || !(*renderer)->resize(options.width, options.height)) return {};
+    double kept = 0;
+    const auto bytes = stage.bundle.bytes();
+    for (std::size_t at = 0; at < bytes.size(); at += kPiece) {
+      (*renderer)->put(at, bytes.subspan(at, std::min(kPiece, bytes.size() - at)));
+      kept = std::max(kept, static_cast<double>((*renderer)->gpu_memory().kept));
+    }
+    (*renderer)->render(RgbImage{},
+                        gl_projection(default_camera(options.width, options.height), 0.1, 100.0),
+                        items);
+    return {static_cast<double>((*renderer)->gpu_memory().uploaded), kept,
+            static_cast<double>((*renderer)->stats().draw_calls)};
+  };
+  const Figures ours = measured(true);
+  const Figures whole = measured(false);
+  rows.add(path + " arrival uploaded_bytes", ours.bytes, whole.bytes);
+  rows.add(path + " arrival kept_bytes", ours.kept, whole.kept);
+  rows.add(path + " arrival draw_calls", ours.draw_calls, whole.draw_calls);
+}
+
 /// A model as an app shows it: on its pattern where it is in a scene, the camera's picture behind
 /// it.
 struct ShownModel {
@@ -551,6 +583,7 @@ Result<void> add_bundle(const std::string& path, std::span<const CurvePoint> idl
     MODAR_TRY(add_shading_cost(stage, model, curves.name, options, rows));
   }
   MODAR_TRY(add_load(stage, path, rows));
+  if (!stage.bundle.models().empty()) add_arrival(stage, path, options, rows);
   for (std::uint32_t model = 0; model < stage.bundle.models().size(); ++model) {
     const CullCounts counts = count_culling(stage.bundle, model);
     rows.add(name(model) + " inside triangles_sent", static_cast<double>(counts.sent),

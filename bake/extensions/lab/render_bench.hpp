@@ -59,9 +59,11 @@ struct RenderBenchRow {
 /// shading_cpu_ms" (CPU time of a frame with a camera picture, the model on its pattern, its
 /// shadow): the reference is plain shading. Then, a bundle (by its path): open_ms; load_cpu_ms
 /// (buffers into GL) and driver_cpu_ms (glBufferData of the same bytes alone), both against memcpy;
-/// bytes in GL by kind; and, a model, triangles sent from inside it against those whose own boxes
-/// meet the frustum. Call it before anything else of this process has opened a GL context. Errors:
-/// those of MappedFile, BundleView, GlContext and Renderer; kUsage "device.unknown".
+/// bytes in GL by kind; "arrival": it comes in pieces of 64 KiB, ETC1 in place against whole
+/// levels: uploaded_bytes, kept_bytes (the most in memory), draw_calls of a frame; and, a model,
+/// triangles sent from inside it against those whose own boxes meet the frustum. Call it before
+/// anything else of this process has opened a GL context. Errors: those of MappedFile, BundleView,
+/// GlContext and Renderer; kUsage "device.unknown".
 Result<std::vector<RenderBenchRow>> bench_render(std::span<const std::string> bundle_paths,
                                                  const RenderBenchOptions& options);
 

@@ -736,7 +736,7 @@ MODAR_NATIVE(jboolean, waiting)(JNIEnv* env, jclass, jlong number) {
 }
 
 MODAR_NATIVE(void, onDrawFrame)
-(JNIEnv* env, jclass, jlong number, jbyteArray nv21, jobject poses) {
+(JNIEnv* env, jclass, jlong number, jbyteArray nv21, jobject poses, jboolean again) {
   const Use session(env, number, &Session::drawing);
   if (!session || !has_camera(env, *session) || !can_draw(env, *session)) return;
   const float* const from = pose_buffer(env, *session, poses);
@@ -753,12 +753,13 @@ MODAR_NATIVE(void, onDrawFrame)
   picture.planes[1] = frame.get() + luma;
   picture.strides[0] = picture.strides[1] = camera.width;
   picture.full_range = 1;
+  picture.row_count = again ? -1 : 0;
   draw(*session, &picture, from);
 }
 
 MODAR_NATIVE(void, onDrawPlanes)
 (JNIEnv* env, jclass, jlong number, jobject y, jint y_stride, jobject u, jobject v, jint uv_stride,
- jint uv_pixel_stride, jobject poses) {
+ jint uv_pixel_stride, jobject poses, jboolean again) {
   const Use session(env, number, &Session::drawing);
   if (!session || !has_camera(env, *session) || !can_draw(env, *session)) return;
   const float* const from = pose_buffer(env, *session, poses);
@@ -768,6 +769,7 @@ MODAR_NATIVE(void, onDrawPlanes)
   picture.width = camera.width;
   picture.height = camera.height;
   picture.full_range = 1;
+  picture.row_count = again ? -1 : 0;
   picture.strides[0] = y_stride;
   if (y_stride < camera.width) {
     return misuse(env, "android.planes", "luma", "its rows are shorter than the frame",

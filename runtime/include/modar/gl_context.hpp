@@ -20,7 +20,7 @@ struct GlCaps {
   std::uint32_t texture_formats = 0;       ///< bit n: reads the blocks of the TextureFormat n
   std::uint32_t etc1_format =
       0x8D64;  ///< GL_ETC1_RGB8_OES; 0x9274 (ETC2, which reads ETC1's blocks) in some WebGL
-  bool etc1_sub_texture = false;       ///< GL_EXT_compressed_ETC1_RGB8_sub_texture
+  bool etc1_sub_texture = false;       ///< GL_EXT_compressed_ETC1_RGB8_sub_texture, or ETC2
   bool npot_mipmaps = false;           ///< GL_OES_texture_npot
   bool depth24 = false;                ///< GL_OES_depth24
   bool debug_groups = false;           ///< GL_KHR_debug or GL_EXT_debug_marker

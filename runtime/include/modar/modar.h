@@ -170,7 +170,7 @@ typedef struct modar_picture {
   const uint8_t* planes[3];
   ptrdiff_t strides[3];
   int full_range; /* 1: luma from 0 to 255, as from cameras; 0: 16 to 235 */
-  int first_row;  /* the rows that differ from the picture before; row_count 0: all rows */
+  int first_row;  /* the rows that differ from the picture before; row_count 0: all, -1: none */
   int row_count;
   int chroma_step; /* of MODAR_YUV_420_888: bytes from one U or V to the next, the pixel stride of
                       these planes: 1 or 2 */

@@ -126,6 +126,7 @@ struct RenderStats {
   int chunks_skipped = 0;  ///< visible, but beyond the GPU budget
   std::uint64_t triangles = 0;
   std::uint64_t bytes_uploaded = 0;  ///< background, uniforms and streamed buffers of this frame
+  std::uint64_t bytes_same = 0;      ///< of the background: rows that GL has from the one before
   std::uint64_t evictions = 0;       ///< buffers that were evicted in this frame
 };
 
@@ -135,6 +136,7 @@ struct GpuMemory {
   std::uint64_t textures = 0;  ///< bytes
   std::uint64_t batches = 0;   ///< bytes; copies of small meshes that share draw calls
   std::uint64_t uploaded = 0;  ///< bytes sent since create()
+  std::uint64_t kept = 0;      ///< bytes in memory, not in GL: of textures that have come in part
 };
 
 /// How to draw. May change from frame to frame.

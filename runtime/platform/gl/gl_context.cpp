@@ -162,7 +162,8 @@ GlCaps probe_gl_caps() {
     if (!has("GL_WEBGL_compressed_texture_etc1")) caps.etc1_format = 0x9274;
   }
   caps.etc1_sub_texture =
-      caps.reads(TextureFormat::kEtc1Rgb) && has("GL_EXT_compressed_ETC1_RGB8_sub_texture");
+      caps.reads(TextureFormat::kEtc1Rgb) &&
+      (has("GL_EXT_compressed_ETC1_RGB8_sub_texture") || caps.etc1_format == 0x9274);
   caps.npot_mipmaps = es3 || has("GL_OES_texture_npot");
   caps.depth24 = es3 || has("GL_OES_depth24");
   caps.debug_groups = has("GL_KHR_debug") || has("GL_EXT_debug_marker");

@@ -141,7 +141,7 @@ public final class BridgeRun {
             }
             if (commands != null) media.execute(commands);
             media.upload();
-            Native.onDrawFrame(session, frames[i], poses.bytes);
+            Native.onDrawFrame(session, frames[i], poses.bytes, false);
             GlContext.read(rgba);
             line.append("], \"told\": \"" + android.media.MediaPlayer.log.toString().trim() + "\", \"caption\": \""
                     + media.caption("en"));
@@ -187,7 +187,7 @@ public final class BridgeRun {
         double x = c[0] + along * ax + 0.5 - width / 2.0, y = c[1] + along * ay + 0.5 - height / 2.0;
         int screenWidth = way % 2 == 0 ? 320 : 200, screenHeight = way % 2 == 0 ? 200 : 400, degrees = 90 * (way % 4);
         Native.onSurfaceChanged(session, screenWidth, screenHeight, degrees, way > 3);
-        Native.onDrawFrame(session, frame, poses.bytes);
+        Native.onDrawFrame(session, frame, poses.bytes, false);
         for (int turn = 0; turn < degrees; turn += 90) { // clockwise, y down
             double before = x;
             x = -y;
@@ -384,23 +384,36 @@ public final class BridgeRun {
             }
             Native.onCameraFrame(session, frame, i / 30.0, poses.bytes);
             if (layout == NV21) {
-                Native.onDrawFrame(session, frame, poses.bytes);
+                Native.onDrawFrame(session, frame, poses.bytes, false);
             } else if (layout == PLANES) {
                 Native.onDrawPlanes(session, luma(frame, 0), width, apart(frame, 1, 8), apart(frame, 0, 8),
-                        width / 2 + 8, 1, poses.bytes);
+                        width / 2 + 8, 1, poses.bytes, false);
             } else {
                 ByteBuffer[] pair = pairs(frame, 32, layout == PAIRS_NV12);
-                Native.onDrawPlanes(session, luma(frame, 32), width + 32, pair[0], pair[1], width + 32, 2, poses.bytes);
+                Native.onDrawPlanes(
+                        session, luma(frame, 32), width + 32, pair[0], pair[1], width + 32, 2, poses.bytes, false);
             }
             pictures[i] = ByteBuffer.allocateDirect(4 * width * height);
             GlContext.read(pictures[i]);
+        }
+        if (layout == NV21) {
+            // A frame that GL has is not read again.
+            byte[] last = frames[frames.length - 1], other = last.clone();
+            for (int i = 0; i < other.length; i++) other[i] ^= 64;
+            ByteBuffer again = ByteBuffer.allocateDirect(4 * width * height);
+            Native.onDrawFrame(session, other, poses.bytes, true);
+            GlContext.read(again);
+            check(off(pictures[frames.length - 1], again) < 3, "the same frame");
+            Native.onDrawFrame(session, other, poses.bytes, false);
+            GlContext.read(again);
+            check(off(pictures[frames.length - 1], again) > 30, "another frame");
         }
         if (layout == PLANES) {
             check(Native.touch(session, 0, 5, width / 2, height / 2) == 0
                             && Native.touch(session, 1, 5, width, height / 2) == Native.MOVED
                             && Native.touch(session, 2, 5, width, height / 2) == 0,
                     "half around");
-            Native.onDrawFrame(session, frames[frames.length - 1], poses.bytes);
+            Native.onDrawFrame(session, frames[frames.length - 1], poses.bytes, false);
             ByteBuffer moved = ByteBuffer.allocateDirect(4 * width * height);
             GlContext.read(moved);
             check(off(pictures[frames.length - 1], moved) > 30, "gesture");
@@ -476,7 +489,7 @@ public final class BridgeRun {
         throwsCode("android.planes", () -> Native.onCameraPlane(session, plane, width - 1, 0, poses.bytes));
         throwsCode("android.buffer", () -> Native.onCameraPlane(session, plane, Integer.MAX_VALUE, 0, poses.bytes));
         throwsCode("android.buffer", () -> Native.projection(session, 0.1, 10, small));
-        throwsCode("android.surface", () -> Native.onDrawFrame(session, frames[0], poses.bytes));
+        throwsCode("android.surface", () -> Native.onDrawFrame(session, frames[0], poses.bytes, false));
         throwsCode("android.surface", () -> Native.pick(session, 1, 1));
         check(Native.focal(session) == 0, "no frames, no focal length");
         throwsCode("android.surface", () -> Native.onDrawOrbit(session, 0, 0));
@@ -487,16 +500,16 @@ public final class BridgeRun {
         Native.onSurfaceCreated(session, null);
         Native.onSurfaceChanged(session, width, height, 90, true);
         ByteBuffer[] pair = pairs(frames[0], 0, false);
-        throwsCode("android.buffer", () -> Native.onDrawFrame(session, new byte[width * height], poses.bytes));
+        throwsCode("android.buffer", () -> Native.onDrawFrame(session, new byte[width * height], poses.bytes, false));
         throwsCode("android.planes",
-                () -> Native.onDrawPlanes(session, plane, 1, pair[0], pair[1], width, 2, poses.bytes));
+                () -> Native.onDrawPlanes(session, plane, 1, pair[0], pair[1], width, 2, poses.bytes, false));
         throwsCode("android.planes",
-                () -> Native.onDrawPlanes(session, plane, width, pair[0], pair[1], width, 3, poses.bytes));
+                () -> Native.onDrawPlanes(session, plane, width, pair[0], pair[1], width, 3, poses.bytes, false));
         throwsCode("android.buffer",
-                () -> Native.onDrawPlanes(session, plane, width, pair[0], small, width, 2, poses.bytes));
-        Native.onDrawFrame(session, frames[0], poses.bytes); // still as good as new
+                () -> Native.onDrawPlanes(session, plane, width, pair[0], small, width, 2, poses.bytes, false));
+        Native.onDrawFrame(session, frames[0], poses.bytes, false); // still as good as new
         // Samples of U and V that are neither planar nor interleaved.
-        Native.onDrawPlanes(session, plane, width, pair[0], plane, width, 2, poses.bytes);
+        Native.onDrawPlanes(session, plane, width, pair[0], plane, width, 2, poses.bytes, false);
         ByteBuffer matrix = ByteBuffer.allocateDirect(64).order(ByteOrder.nativeOrder());
         Native.projection(session, 0.5, 50, matrix);
         // Focal length = width: the frame's sides are seen at x/z = 0.5.
@@ -506,7 +519,7 @@ public final class BridgeRun {
         for (final long closed : new long[] {session, 0, -1, Long.MAX_VALUE}) {
             throwsCode("android.closed", () -> Native.onCameraFrame(closed, frames[0], 0, poses.bytes));
             throwsCode("android.closed", () -> Native.onCameraPlane(closed, plane, width, 0, poses.bytes));
-            throwsCode("android.closed", () -> Native.onDrawFrame(closed, frames[0], poses.bytes));
+            throwsCode("android.closed", () -> Native.onDrawFrame(closed, frames[0], poses.bytes, false));
             throwsCode("android.closed", () -> Native.onSurfaceCreated(closed, null));
             throwsCode("android.closed", () -> Native.onSurfaceChanged(closed, 1, 1, 0, false));
             throwsCode("android.closed", () -> Native.setCamera(closed, 4, 4, null, 0, false, false));
@@ -548,7 +561,7 @@ public final class BridgeRun {
                 Poses poses = new Poses(Native.patternCount(session));
                 Native.onSurfaceCreated(session, null);
                 Native.onSurfaceChanged(session, width, height, 0, false);
-                for (int i = 0;; i++) Native.onDrawFrame(session, frames[i % frames.length], poses.bytes);
+                for (int i = 0;; i++) Native.onDrawFrame(session, frames[i % frames.length], poses.bytes, false);
             };
             Thread[] threads = new Thread[2];
             for (int i = 0; i < 2; i++) {
@@ -625,7 +638,7 @@ public final class BridgeRun {
                 luma.put(frame, 0, width * height);
                 Native.onCameraPlane(session, luma, width, i / 30.0, poses.bytes);
             }
-            Native.onDrawFrame(session, frame, poses.bytes);
+            Native.onDrawFrame(session, frame, poses.bytes, false);
         }
         System.out.println((heap() - heap) + " " + (resident() - resident) + " " + (references() - references));
         Native.close(session);

@@ -14,10 +14,12 @@ final class Diagnostics {
     volatile String gl = "no context yet";
     volatile String profile = "";
     volatile long gpuBytes;
+    volatile long frameBytes;
     private final float[] trackMs = new float[WINDOW];
     private final float[] drawMs = new float[WINDOW];
     private volatile long tracked;
     private volatile long drawn;
+    private volatile long again;
     private volatile long seen;
     private volatile long firstNs;
     private volatile long lastNs;
@@ -34,6 +36,11 @@ final class Diagnostics {
     /** By GL's thread alone. */
     void drawn(long nanoseconds) {
         drawMs[(int) (drawn++ % WINDOW)] = nanoseconds * 1e-6f;
+    }
+
+    /** By GL's thread alone. */
+    void drawnAgain() {
+        again++;
     }
 
     /** By any thread. */
@@ -60,9 +67,9 @@ final class Diagnostics {
         double seconds = (lastNs - firstNs) * 1e-9;
         return words.get("diagnostics", Build.MANUFACTURER, Build.MODEL, Build.VERSION.RELEASE, Build.VERSION.SDK_INT,
                 version / 10000, version / 100 % 100, version % 100, gl, profile, bundle, release, camera, tracked,
-                seen, drawn, tracked > 1 ? (tracked - 1) / seconds : 0, share(trackMs, tracked, 50),
-                share(trackMs, tracked, 95), share(drawMs, drawn, 50), share(drawMs, drawn, 95), gpuBytes / 1000,
-                errors);
+                seen, drawn, again, again * frameBytes / 1000, tracked > 1 ? (tracked - 1) / seconds : 0,
+                share(trackMs, tracked, 50), share(trackMs, tracked, 95), share(drawMs, drawn, 50),
+                share(drawMs, drawn, 95), gpuBytes / 1000, errors);
     }
 
     /** The percentile of the values. */

@@ -4,6 +4,8 @@ package org.modar;
 abstract class Frame {
     final Poses poses;
     double timeS;
+    /** It was drawn: GL has its pixels. */
+    boolean drawn;
 
     Frame(int patterns) {
         poses = new Poses(patterns);

@@ -160,12 +160,13 @@ public final class Native {
     /** Something turns by itself: draw on. */
     public static native boolean waiting(long session) throws ModarException;
 
-    /** Draws the frame and the content of its patterns. */
-    public static native void onDrawFrame(long session, byte[] nv21, ByteBuffer poses) throws ModarException;
+    /** Draws the frame and the content of its patterns. again: the frame that was drawn last, which is not uploaded again. */
+    public static native void onDrawFrame(long session, byte[] nv21, ByteBuffer poses, boolean again)
+            throws ModarException;
 
     /** The same with the planes of YUV_420_888, with the strides that the Image states. */
     public static native void onDrawPlanes(long session, ByteBuffer y, int yStride, ByteBuffer u, ByteBuffer v,
-            int uvStride, int uvPixelStride, ByteBuffer poses) throws ModarException;
+            int uvStride, int uvPixelStride, ByteBuffer poses, boolean again) throws ModarException;
 
     /**
      * Draws the content of a pattern without a camera, for an eye that goes around it: see

@@ -83,7 +83,7 @@ final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailable
         void draw(long session) throws ModarException {
             Image.Plane u = planes[1];
             Native.onDrawPlanes(session, planes[0].getBuffer(), planes[0].getRowStride(), u.getBuffer(),
-                    planes[2].getBuffer(), u.getRowStride(), u.getPixelStride(), poses.bytes);
+                    planes[2].getBuffer(), u.getRowStride(), u.getPixelStride(), poses.bytes, drawn);
         }
 
         @Override

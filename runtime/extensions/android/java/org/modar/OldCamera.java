@@ -36,7 +36,7 @@ final class OldCamera extends CameraFeed implements Camera.PreviewCallback {
 
         @Override
         void draw(long session) throws ModarException {
-            Native.onDrawFrame(session, pixels, poses.bytes);
+            Native.onDrawFrame(session, pixels, poses.bytes, drawn);
         }
 
         @Override

@@ -132,6 +132,7 @@ final class Stage implements GLSurfaceView.Renderer {
     void cameraOpened(int frameWidth, int frameHeight, int turn) {
         sensorDegrees = turn;
         diagnostics.camera = frameWidth + " x " + frameHeight + ", turned by " + turn;
+        diagnostics.frameBytes = frameWidth * frameHeight * 3L / 2;
         try {
             Native.setCamera(session, frameWidth, frameHeight, cameraFile, focal, searchApart, true);
         } catch (ModarException error) {
@@ -150,6 +151,7 @@ final class Stage implements GLSurfaceView.Renderer {
             screen.failed(error);
             return;
         }
+        frame.drawn = false;
         frames.put(frame);
         view.requestRender();
     }
@@ -209,7 +211,9 @@ final class Stage implements GLSurfaceView.Renderer {
             } else if (shown != null) {
                 if (bare) shown.poses.clear();
                 act(shown.timeS, shown.poses);
+                if (shown.drawn) diagnostics.drawnAgain();
                 shown.draw(session);
+                shown.drawn = true;
             } else {
                 return;
             }
