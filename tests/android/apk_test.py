@@ -20,8 +20,8 @@ from servers import NGINX, Keeper, Nginx  # noqa: E402
 TOOLS = ("javac", "aapt", "aapt2", "zipalign", "apksigner", "jarsigner", "dexdump", "keytool", "proguard")
 GOLDEN = ROOT / "tests" / "golden" / "v1_0.modar"
 # 37,000 before the look without the camera, photos, texts by language; 46,000 before videos and sounds; 54,000 before marks of labels;
-# 56,400 before recordings; 64,600 before the menu and pictures of visitors' own
-MAX_DEX = 75_000
+# 56,400 before recordings; 64,600 before the menu and pictures of visitors' own; 75,000 before lists
+MAX_DEX = 77_000
 
 
 def run(*words, **options):

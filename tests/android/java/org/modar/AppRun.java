@@ -114,6 +114,44 @@ public final class AppRun {
     }
 
     /** All frames once, from a camera that was opened anew: the last picture. */
+    /** Over the camera's picture: the bundle's pictures, and bundles of other apps next to it. */
+    private static void lists() throws Exception {
+        check(gone(R.id.menu_models), "one bundle has no list");
+        click(R.id.menu_patterns);
+        android.app.AlertDialog.Builder list = android.app.AlertDialog.shown;
+        check(list.title.equals("Choose a picture to look at") && list.items.length == 1
+                        && list.items[0].equals("cover"),
+                "the bundle's pictures, without the visitor's own");
+        list.chosen.onClick(null, 0);
+        check(gone(R.id.menu) && Camera.opened == 0, "looked at without the camera");
+        app.onBackPressed();
+        click(R.id.menu_open);
+        check(Activity.wanted.type.equals("*/*"), "any file");
+        File plain = new File(Context.folder, "notes.txt");
+        Files.write(plain.toPath(), new byte[100]);
+        app.onActivityResult(
+                3, Activity.RESULT_OK, new android.content.Intent("", new android.net.Uri(plain.getPath())));
+        check(status().startsWith("The models cannot be read") && !new File(Context.folder, "notes.modar").exists()
+                        && !new File(Context.folder, "notes.part").exists(),
+                "no bundle");
+        String asset = new AssetManager().list("bundles")[0];
+        File given = new File(Context.folder, "gallery/another.modar");
+        given.getParentFile().mkdirs();
+        Files.write(given.toPath(), new AssetManager().open("bundles/" + asset).readAllBytes());
+        app.onActivityResult(
+                3, Activity.RESULT_OK, new android.content.Intent("", new android.net.Uri(given.getPath())));
+        check(gone(R.id.menu) && told().contains("another (folder)"), "the other bundle is shown");
+        app.onBackPressed();
+        click(R.id.menu_models);
+        list = android.app.AlertDialog.shown;
+        check(list.title.equals("Choose a model") && list.items.length == 2 && list.items[0].equals("another"),
+                "two bundles");
+        list.chosen.onClick(null, 1);
+        check(gone(R.id.menu) && told().contains("(app)") && Camera.opened == 1, "the app's own again");
+        new File(Context.folder, "another.modar").delete();
+        app.onBackPressed();
+    }
+
     /** A photo that its EXIF turns: red at the top left, green at the top right, blue below. */
     private static void upright(String photo) throws Exception {
         app.onActivityResult(2, Activity.RESULT_OK, new android.content.Intent("", new android.net.Uri(photo)));
@@ -538,6 +576,7 @@ public final class AppRun {
         app.onActivityResult(
                 2, Activity.RESULT_OK, new android.content.Intent("", new android.net.Uri(other + ".none")));
         check(status().startsWith("This file is no picture"), "no file");
+        lists();
         shown(R.id.menu_forget).click();
         check(new File(Context.folder, "own").list().length == 0 && gone(R.id.menu_forget), "forgotten");
         check(changed(alone, shown()) < 0.001, "no model is there: " + changed(alone, shown()));

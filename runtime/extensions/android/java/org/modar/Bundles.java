@@ -4,6 +4,7 @@ import android.content.Context;
 import android.content.res.AssetFileDescriptor;
 import android.graphics.Bitmap;
 import android.graphics.BitmapFactory;
+import android.net.Uri;
 import android.os.ParcelFileDescriptor;
 import java.io.ByteArrayOutputStream;
 import java.io.File;
@@ -115,6 +116,33 @@ final class Bundles {
             throw new ModarException(2, "android.asset", asset,
                     "it cannot be opened in the APK: " + compressed.getMessage(),
                     "make the APK with scripts/apk.sh, which stores bundles uncompressed");
+        }
+    }
+
+    /** Copies what another app hands over into the app's folder, if it is a bundle. */
+    File add(Uri from) throws IOException, ModarException {
+        String name = String.valueOf(from.getLastPathSegment());
+        name = nameOf(name.substring(Math.max(name.lastIndexOf('/'), name.lastIndexOf(':')) + 1));
+        File part = new File(folder, name + ".part");
+        try {
+            FileOutputStream out = new FileOutputStream(part);
+            try {
+                copy(context.getContentResolver().openInputStream(from), out);
+                out.getFD().sync();
+            } finally {
+                out.close();
+            }
+            long opened = Native.openFile(part.getPath());
+            try {
+                Native.verify(opened);
+            } finally {
+                Native.close(opened);
+            }
+            File added = new File(folder, name + ENDING);
+            if (!part.renameTo(added)) throw new IOException(added.getPath());
+            return added;
+        } finally {
+            part.delete();
         }
     }
 

@@ -54,13 +54,14 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     private static final int MADE = 12;
     private static final int FIRST = 13;
     private static final int CHOSEN_PICTURE = 2;
+    private static final int CHOSEN_MODEL = 3;
 
     /** Words of what modar.h calls MODAR_HINT_CLOSER and so on. */
     private static final String[] HINTS = {"look", "far", "dark", "blurred", "outside", "hold"};
-    private static final int[] MENU
-            = {R.id.menu_go, R.id.menu_take, R.id.menu_choose, R.id.menu_forget, R.id.own_how, R.id.own_use};
-    private static final String[] MENU_WORDS
-            = {"menu-go", "menu-take", "menu-choose", "menu-forget", "own-how", "own-use"};
+    private static final int[] MENU = {R.id.menu_go, R.id.menu_models, R.id.menu_patterns, R.id.menu_take,
+            R.id.menu_choose, R.id.menu_open, R.id.menu_forget, R.id.own_how, R.id.own_use};
+    private static final String[] MENU_WORDS = {"menu-go", "menu-models", "menu-patterns", "menu-take", "menu-choose",
+            "menu-open", "menu-forget", "own-how", "own-use"};
 
     private final Handler main = new Handler(Looper.getMainLooper(), this);
     private Diagnostics diagnostics;
@@ -736,6 +737,8 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     private void showMenu(Boolean shown) {
         if (shown != null) showIf(findViewById(R.id.menu), shown);
         boolean may = session != 0 && !models.isEmpty();
+        showIf(findViewById(R.id.menu_models), session != 0 && sources.size() > 1);
+        showIf(findViewById(R.id.menu_patterns), session != 0 && baked > 0);
         showIf(findViewById(R.id.menu_take), may);
         showIf(findViewById(R.id.menu_choose), may);
         showIf(findViewById(R.id.menu_model), may && models.size() > 1);
@@ -753,12 +756,66 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         follow();
     }
 
-    private void choosePicture() {
+    /** A list over the camera's picture; back closes it. */
+    private void choose(String title, String[] names, final boolean bundle) {
+        new AlertDialog.Builder(this)
+                .setTitle(words.get(title))
+                .setItems(names,
+                        new DialogInterface.OnClickListener() {
+                            @Override
+                            public void onClick(DialogInterface dialog, int which) {
+                                showMenu(false);
+                                if (bundle) showFrom(which);
+                                else look(which);
+                            }
+                        })
+                .show();
+    }
+
+    private void chooseBundle() {
+        String[] names = new String[sources.size()];
+        for (int i = 0; i < names.length; i++) names[i] = sources.get(i).name;
+        choose("menu-models", names, true);
+    }
+
+    private void choosePattern() {
+        String[] names = new String[baked];
+        for (int i = 0; i < baked; i++) names[i] = texts.name(patterns[i]);
+        choose("menu-patterns", names, false);
+    }
+
+    /** That bundle, or the next that can be opened. */
+    private void showFrom(int index) {
+        source = index - 1;
+        look(-1);
+        showNext();
+    }
+
+    /** A bundle of another app: it is in this one's folder from now on. */
+    private void addBundle(Uri from) {
+        try {
+            File added = bundles.add(from);
+            sources = bundles.list();
+            for (int i = 0; i < sources.size(); i++) {
+                if (added.equals(sources.get(i).file)) showFrom(i);
+            }
+            showMenu(false);
+        } catch (IOException unreadable) {
+            notice(words.get("space", unreadable.getMessage()));
+        } catch (ModarException other) {
+            notice(words.get("bundle", other.getMessage()));
+        } catch (RuntimeException refused) { // other apps throw what they like
+            notice(words.get("bundle", refused.getMessage()));
+        }
+    }
+
+    /** kind: a MIME type. Another app answers. */
+    private void askFor(String kind, int request) {
         Intent choose = new Intent(Intent.ACTION_GET_CONTENT);
-        choose.setType("image/*");
+        choose.setType(kind);
         choose.addCategory(Intent.CATEGORY_OPENABLE);
         try {
-            startActivityForResult(choose, CHOSEN_PICTURE);
+            startActivityForResult(choose, request);
         } catch (ActivityNotFoundException none) {
             diagnostics.error(none.getMessage());
         }
@@ -766,7 +823,9 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
 
     @Override
     protected void onActivityResult(int request, int result, Intent answer) {
-        if (request != CHOSEN_PICTURE || result != RESULT_OK || answer == null || answer.getData() == null) return;
+        if (result != RESULT_OK || answer == null || answer.getData() == null) return;
+        if (request == CHOSEN_MODEL) addBundle(answer.getData());
+        if (request != CHOSEN_PICTURE) return;
         try {
             edit(own.read(answer.getData()));
         } catch (IOException unreadable) {
@@ -906,8 +965,17 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
                 showMenu(false);
                 take(true);
                 break;
+            case R.id.menu_models:
+                chooseBundle();
+                break;
+            case R.id.menu_patterns:
+                choosePattern();
+                break;
             case R.id.menu_choose:
-                choosePicture();
+                askFor("image/*", CHOSEN_PICTURE);
+                break;
+            case R.id.menu_open:
+                askFor("*/*", CHOSEN_MODEL);
                 break;
             case R.id.menu_model:
                 model = (model + 1) % models.size();
