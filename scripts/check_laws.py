@@ -51,7 +51,7 @@ THIRD_PARTIES = {
     "png.h": (r"bake/image/png\.cpp",),
     "zlib.h": (r"bake/export/usdz_writer\.cpp",),
     "minizip/": (r"bake/extensions/studio/archive\.cpp",),
-    "jpeglib.h": (r"bake/image/jpeg\.cpp",),
+    "jpeglib.h": (r"bake/image/jpeg\.cpp", r"tests/image/.*"),
     "jerror.h": (r"bake/image/jpeg\.cpp",),
     "webp/": (r"bake/image/webp\.cpp",),
     "lcms2.h": (r"bake/image/colour_profile\.cpp",),

@@ -40,11 +40,16 @@ Profile matrix_profile(const StatedColours& stated) {
 
 using Transform = std::unique_ptr<void, decltype(&cmsDeleteTransform)>;
 
-Transform to_srgb(const Profile& from, cmsUInt32Number format) {
+Transform to_srgb(const Profile& from, cmsUInt32Number format,
+                  cmsUInt32Number flags = cmsFLAGS_COPY_ALPHA) {
   const Profile srgb(cmsCreate_sRGBProfile());
   return {cmsCreateTransform(from.get(), format, srgb.get(), TYPE_RGBA_8,
-                             INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_COPY_ALPHA),
+                             INTENT_RELATIVE_COLORIMETRIC, flags),
           &cmsDeleteTransform};
+}
+
+Profile open_profile(std::span<const std::byte> bytes) {
+  return Profile(cmsOpenProfileFromMem(bytes.data(), static_cast<cmsUInt32Number>(bytes.size())));
 }
 
 bool is_gray(const RgbaImage& image) {
@@ -99,13 +104,25 @@ bool convert_colours(const Profile& profile, RgbaImage& image) {
   return true;
 }
 
+/// As if each ink took its own light alone.
+void mix_inks(bool inverted, RgbaImage& image) {
+  for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
+    std::uint8_t* const pixel = &image.pixels[i];
+    const int paper = inverted ? pixel[3] : 255 - pixel[3];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const int ink = inverted ? 255 - pixel[c] : pixel[c];
+      pixel[c] = static_cast<std::uint8_t>(paper - (ink * paper >> 8));
+    }
+    pixel[3] = 255;
+  }
+}
+
 }  // namespace
 
 bool convert_to_srgb(const StatedColours& stated, RgbaImage& image) {
   Profile profile;
   if (!stated.profile.empty()) {
-    profile.reset(cmsOpenProfileFromMem(stated.profile.data(),
-                                        static_cast<cmsUInt32Number>(stated.profile.size())));
+    profile = open_profile(stated.profile);
   } else if (stated.gamma > 0 || stated.has_primaries) {
     profile = matrix_profile(stated);
   }
@@ -113,6 +130,18 @@ bool convert_to_srgb(const StatedColours& stated, RgbaImage& image) {
   const cmsColorSpaceSignature space = cmsGetColorSpace(profile.get());
   if (space == cmsSigGrayData) return convert_gray(profile, image);
   return space == cmsSigRgbData && convert_colours(profile, image);
+}
+
+void convert_inks(std::span<const std::byte> profile, bool inverted, RgbaImage& image) {
+  const Profile inks = open_profile(profile);
+  if (!inks || cmsGetColorSpace(inks.get()) != cmsSigCmykData) return mix_inks(inverted, image);
+  const Transform transform = to_srgb(inks, inverted ? TYPE_CMYK_8_REV : TYPE_CMYK_8, 0);
+  if (!transform) return mix_inks(inverted, image);
+  for (std::size_t y = 0; y < image.height; ++y) {
+    std::uint8_t* const row = &image.pixels[y * image.width * 4];
+    cmsDoTransform(transform.get(), row, row, image.width);
+    for (std::size_t x = 0; x < image.width; ++x) row[4 * x + 3] = 255;
+  }
 }
 
 }  // namespace modar

@@ -37,6 +37,10 @@ struct StatedColours {
 /// not by profiles that cannot be read or are of other kinds of colours.
 bool convert_to_srgb(const StatedColours& stated, RgbaImage& image);
 
+/// Pixels of four inks become opaque RGBA, by their ICC profile where it is one of such inks.
+/// inverted: 255 is no ink.
+void convert_inks(std::span<const std::byte> profile, bool inverted, RgbaImage& image);
+
 /// An image as its file stores it.
 struct StoredImage {
   RgbaImage image;

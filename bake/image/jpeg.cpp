@@ -101,6 +101,8 @@ class JpegReader {
   }
   /// YCCK counts as CMYK, which libjpeg makes of it.
   [[nodiscard]] bool is_cmyk() const { return info_.num_components == 4; }
+  /// Programs that state Adobe's segment store the inks inverted, and libjpeg hands them on so.
+  [[nodiscard]] bool is_inverted() const { return info_.saw_Adobe_marker != FALSE; }
 
   /// Valid after read_header().
   [[nodiscard]] ExifFacts exif() const {
@@ -190,17 +192,6 @@ class JpegWriter {
   unsigned long size_ = 0;
 };
 
-/// Adobe's programs store the inks inverted, as libjpeg hands them on: 255 is no ink.
-void cmyk_to_rgba(std::vector<std::uint8_t>& pixels) {
-  for (std::size_t i = 0; i < pixels.size(); i += 4) {
-    const int k = pixels[i + 3];
-    for (std::size_t c = 0; c < 3; ++c) {
-      pixels[i + c] = static_cast<std::uint8_t>(k - ((255 - pixels[i + c]) * k >> 8));
-    }
-    pixels[i + 3] = 255;
-  }
-}
-
 }  // namespace
 
 Result<StoredImage> decode_jpeg(std::span<const std::byte> bytes, const std::string& name) {
@@ -212,10 +203,14 @@ Result<StoredImage> decode_jpeg(std::span<const std::byte> bytes, const std::str
   MODAR_TRY(check_image_size(reader.width(), reader.height(), bytes.size(), name));
   StoredImage stored;
   stored.exif = reader.exif();
-  if (!reader.is_cmyk()) stored.colours.profile = reader.profile();
+  std::vector<std::byte> profile = reader.profile();
   allocate_pixels(stored.image, reader.width(), reader.height());
   if (!reader.read_pixels(stored.image.pixels.data())) return damaged();
-  if (reader.is_cmyk()) cmyk_to_rgba(stored.image.pixels);
+  if (reader.is_cmyk()) {
+    convert_inks(profile, reader.is_inverted(), stored.image);
+  } else {
+    stored.colours.profile = std::move(profile);
+  }
   return stored;
 }
 

@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 #include <fstream>
 
+#include <jpeglib.h>
 #include <array>
+#include <cstdio>
+#include <cstdlib>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -509,8 +512,7 @@ Bytes icc_profile(const char* space,
 }
 
 /// A JPEG with a profile in its APP2.
-Bytes with_profile(const cv::Mat& picture, const Bytes& profile) {
-  Bytes bytes = encoded(picture, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 100});
+Bytes with_profile(Bytes bytes, const Bytes& profile) {
   const auto size = static_cast<unsigned>(profile.size() + 16);
   Bytes segment = Bytes{} + std::initializer_list<unsigned>{0xFF, 0xE2, size >> 8, size & 255};
   for (const char c : std::string_view("ICC_PROFILE\0\1\1", 14)) {
@@ -519,6 +521,10 @@ Bytes with_profile(const cv::Mat& picture, const Bytes& profile) {
   segment.insert(segment.end(), profile.begin(), profile.end());
   bytes.insert(bytes.begin() + 2, segment.begin(), segment.end());
   return bytes;
+}
+
+Bytes with_profile(const cv::Mat& picture, const Bytes& profile) {
+  return with_profile(encoded(picture, ".jpg", {cv::IMWRITE_JPEG_QUALITY, 100}), profile);
 }
 
 // Display P3 by its registered colorants, adapted to D50.
@@ -540,6 +546,92 @@ TEST(ImageReader, ColoursOfProfilesBecomeSrgb) {
   const cv::Mat colours(8, 8, CV_8UC3, cv::Scalar(42, 151, 67));
   expect_near(first_pixel(with_profile(colours, gray)), {67, 151, 42});
   expect_near(first_pixel(with_profile(colours, {p3.begin(), p3.begin() + 150})), {67, 151, 42});
+}
+
+/// A profile of inks (ICC.1:2010, lut16Type): the Lab of each of their 16 mixtures, in between by
+/// interpolation.
+Bytes ink_profile(const std::array<std::array<double, 3>, 16>& mixtures) {
+  std::string lut("mft2\0\0\0\0\4\3\2\0", 12);
+  const auto put = [](std::string& to, std::uint32_t value, int bytes) {
+    for (int i = bytes; i-- > 0;) to += static_cast<char>(value >> 8 * i & 255);
+  };
+  for (int i = 0; i < 9; ++i) put(lut, i % 4 == 0 ? 65536 : 0, 4);
+  for (int i = 0; i < 2; ++i) put(lut, 2, 2);  // entries of curves
+  const auto straight = [&](int channels) {
+    for (int i = 0; i < channels; ++i) put(lut, 0xFFFF, 4);
+  };
+  straight(4);
+  for (const auto& [l, a, b] : mixtures) {
+    put(lut, static_cast<std::uint32_t>(std::lround(l * 652.8)), 2);
+    put(lut, static_cast<std::uint32_t>(std::lround(a * 256 + 32768)), 2);
+    put(lut, static_cast<std::uint32_t>(std::lround(b * 256 + 32768)), 2);
+  }
+  straight(3);
+  std::string all;
+  put(all, static_cast<std::uint32_t>(144 + lut.size()), 4);
+  all += std::string(4, '\0') + std::string("\2\0\0\0", 4) + "prtrCMYKLab ";
+  all += std::string(12, '\0') + "acsp" + std::string(28, '\0');
+  for (const std::uint32_t white : {63190u, 65536u, 54061u}) put(all, white, 4);
+  all += std::string(48, '\0');
+  put(all, 1, 4);
+  all += "A2B0";
+  put(all, 144, 4);
+  put(all, static_cast<std::uint32_t>(lut.size()), 4);
+  all += lut;
+  return to_bytes({all.begin(), all.end()});
+}
+
+/// Of one colour, its inks 255 at most. adobe: with the segment that says they are inverted.
+Bytes ink_jpeg(std::array<std::uint8_t, 4> inks, bool adobe) {
+  jpeg_compress_struct info{};
+  jpeg_error_mgr errors{};
+  unsigned char* buffer = nullptr;
+  unsigned long size = 0;
+  info.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&info);
+  jpeg_mem_dest(&info, &buffer, &size);
+  info.image_width = info.image_height = 8;
+  info.input_components = 4;
+  info.in_color_space = JCS_CMYK;
+  jpeg_set_defaults(&info);
+  jpeg_set_quality(&info, 100, TRUE);
+  info.write_Adobe_marker = adobe ? TRUE : FALSE;
+  jpeg_start_compress(&info, TRUE);
+  std::array<std::uint8_t, 32> row{};
+  for (std::size_t i = 0; i < row.size(); ++i) {
+    row[i] = adobe ? static_cast<std::uint8_t>(255 - inks[i % 4]) : inks[i % 4];
+  }
+  for (JSAMPROW rows[] = {row.data()}; info.next_scanline < 8;)
+    jpeg_write_scanlines(&info, rows, 1);
+  jpeg_finish_compress(&info);
+  const auto* first = reinterpret_cast<const std::byte*>(buffer);
+  Bytes bytes(first, first + size);
+  jpeg_destroy_compress(&info);
+  std::free(buffer);
+  return bytes;
+}
+
+// Lab of offset print on coated paper, in sRGB by CIE's formulas and Bradford's adaptation.
+TEST(ImageReader, InksBecomeColoursByTheirProfile) {
+  std::array<std::array<double, 3>, 16> mixtures{};  // index: C M Y K, the last one fastest
+  mixtures[0] = {100, 0, 0};
+  mixtures[8] = {55, -37, -50};
+  mixtures[4] = {48, 74, -3};
+  mixtures[2] = {89, -5, 93};
+  mixtures[1] = {16, 0, 0};
+  const Bytes profile = ink_profile(mixtures);
+  for (const bool adobe : {true, false}) {
+    const auto seen = [&](std::array<std::uint8_t, 4> inks, const Bytes& with) {
+      return first_pixel(with_profile(ink_jpeg(inks, adobe), with));
+    };
+    expect_near(seen({0, 0, 255, 0}, profile), {247, 224, 0});
+    expect_near(seen({0, 255, 0, 0}, profile), {216, 12, 122});
+    expect_near(seen({0, 0, 0, 255}, profile), {40, 40, 40});
+    expect_near(seen({0, 0, 0, 0}, profile), {255, 255, 255});
+    // Without one that can be read.
+    expect_near(seen({0, 255, 0, 0}, {profile.begin(), profile.begin() + 150}), {255, 0, 255});
+    expect_near(seen({0, 0, 0, 255}, {profile.begin(), profile.begin() + 150}), {0, 0, 0});
+  }
 }
 
 // As photo shops leave them: libpng would write to stderr, and it is not our words.
