@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # The ModAR paper's collection: POTTERY, BUST, STATUE and CHURCH, each on any of six patterns, as bundles, a page and an app.
 #   scripts/collection.sh [--vertices N] [FOLDER]     FOLDER: out/collection
-# --vertices   of the church (7,335,148 with 14,645,744 triangles: minutes, a bundle of 184 MB); a smaller one bakes in seconds
+# --vertices   of the church (7,335,148 with 14,645,744 triangles: minutes, 2.2 GB of memory, a bundle of 286 MB); a smaller one bakes in seconds
 # Writes FOLDER/{pottery,bust,statue,church}.modar, FOLDER/site where the page's engine was
-# built (cmake --preset web), and FOLDER/collection.apk where ANDROID_NDK names Google's compilers. MODAR: the program
+# built (cmake --preset web; with preset wasm visitors may open an OBJ file), and FOLDER/collection.apk where ANDROID_NDK names Google's compilers. MODAR: the program
 # (build/release/bin/modar). Page and app list the four models; any of the six printed patterns shows the chosen one.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -32,7 +32,12 @@ for model in "$root"/assets/models/{pottery,bust,statue}.obj "$folder/church.obj
   bundles+=("$folder/$name.modar")
 done
 if [ -f "$root/build/web/web/engine-plain.wasm" ]; then
-  "$modar" web "${bundles[@]}" -o "$folder/site" --page "$root/build/web/web" --title "Collection" --force --quiet
+  page=("$root/build/web/web")
+  if [ -f "$root/build/wasm/bin/baker.wasm" ]; then
+    "$root/scripts/wasm/package.sh" "$folder/page"
+    page=("$folder/page" --baker)
+  fi
+  "$modar" web "${bundles[@]}" -o "$folder/site" --page "${page[@]}" --title "Collection" --force --quiet
   echo "$folder/site"
 else
   echo "collection.sh: no page: the engine was not built (cmake --preset web)" >&2

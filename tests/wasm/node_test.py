@@ -179,6 +179,48 @@ class Library(unittest.TestCase):
         self.assertEqual(hexes, hashlib.sha256((self.base / "native.modar").read_bytes()).hexdigest())
         self.assertEqual(browser.errors, [])
 
+    def test_a_page_bakes_a_model_of_the_visitor_onto_its_pictures(self):
+        """modar web --baker: a model with its texture from this device, in the page's lists; the bytes of `modar bake --tier phone`."""
+        if CHROMIUM is None:
+            self.skipTest("chromium is not installed")
+        home, site = self.base / "visit", self.base / "baker-site"
+        home.mkdir()
+        subprocess.run([BIN / "modar", "bake", "--quiet", ASSETS / "models/bust.obj", ASSETS / "patterns/cover.png", "-o", home / "old.modar"], check=True)
+        web = [BIN / "modar", "web", home / "old.modar", "--quiet", "--languages", "en"]
+        refused = subprocess.run([*web, "--page", ROOT / "build/web/web", "--baker", "-o", site], capture_output=True, text=True)
+        self.assertEqual((refused.returncode, "it contains no baker" in refused.stderr), (5, True), refused.stderr)
+        subprocess.run([*web, "--page", self.laid, "--baker", "-o", site], check=True)
+        names = [f"models/pottery.{end}" for end in ("mtl", "obj", "png")]
+        server = Server(site)
+        self.addCleanup(server.close)
+        browser = Browser(self.base / "visitor", "/dev/null")
+        self.addCleanup(browser.close)
+        browser.open(server.url)
+        browser.wait("document.getElementById('start').textContent !== ''", "the page")
+        self.assertFalse(any("baker" in url for url in browser.requests))
+        browser.run("document.getElementById('lists-open').click()")
+        browser.wait("Boolean(document.querySelector('#lists input'))", "the lists")
+        root = browser.call("DOM.getDocument")["root"]["nodeId"]
+        node = browser.call("DOM.querySelector", nodeId=root, selector="#lists input")["nodeId"]
+        browser.call("DOM.setFileInputFiles", files=[str(ASSETS / names[0])], nodeId=node)
+        browser.wait("document.querySelector('#lists output').value.includes(';')", "what to do without a model", 600)
+        browser.call("DOM.setFileInputFiles", files=[str(ASSETS / name) for name in names], nodeId=node)
+        browser.wait("document.getElementById('bundle').options.length === 2 && document.getElementById('bundle').value === '1'", "the bake", 600)
+        if os.environ.get("MODAR_SCREENSHOT"):
+            browser.run("document.getElementById('viewer').look()")
+            browser.wait("document.getElementById('viewer').state === 'around'", "the turntable")
+            time.sleep(2)
+            browser.screenshot(os.environ["MODAR_SCREENSHOT"])
+        hexes = browser.run("document.getElementById('viewer').srcObject().then((bytes) => crypto.subtle.digest('SHA-256', bytes)).then((hash) => "
+                            "[...new Uint8Array(hash)].map((byte) => byte.toString(16).padStart(2, '0')).join(''))")
+        (home / "pictures").mkdir()
+        shutil.copy(next(site.glob("patterns/*.webp")), home / "pictures/cover.webp")
+        for name in names:
+            shutil.copy(ASSETS / name, home)
+        subprocess.run([BIN / "modar", "bake", "--quiet", "--tier", "phone", "--model", "pottery.obj", "--pattern", "pictures/cover.webp", "-o", "native.modar"],
+                       cwd=home, check=True)
+        self.assertEqual(hexes, hashlib.sha256((home / "native.modar").read_bytes()).hexdigest())
+
 
 if __name__ == "__main__":
     unittest.main()

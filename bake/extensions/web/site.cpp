@@ -68,6 +68,10 @@ constexpr std::array<std::string_view, 12> kModules = {
 constexpr std::array<std::string_view, 3> kUpdateFiles = {"engine-update.js", "engine-update.wasm",
                                                           "update-worker.js"};
 
+/// What bakes visitors' models: of the npm package, requested when one is opened.
+constexpr std::array<std::string_view, 4> kBakerFiles = {"bake.js", "bake-worker.js",
+                                                         "bin/baker.wasm", "bin/module/baker.js"};
+
 struct Draft {
   const SiteOptions& options;
   std::string page;
@@ -367,6 +371,11 @@ Result<void> put_page(Draft& draft) {
     MODAR_ASSIGN(const std::string content, page_text(draft, std::string(name)));
     MODAR_TRY(put_online(draft, std::string(name), std::as_bytes(std::span(content))));
   }
+  for (const std::string_view name : kBakerFiles) {
+    if (!draft.options.baker) continue;
+    MODAR_ASSIGN(const std::string content, page_text(draft, std::string(name)));
+    MODAR_TRY(put_online(draft, std::string(name), std::as_bytes(std::span(content))));
+  }
   names.insert(names.end(), kModules.begin(), kModules.end());
   for (const std::string_view name : names) MODAR_TRY(put_source_map(draft, std::string(name)));
   for (const std::string& language : draft.languages) {
@@ -559,6 +568,10 @@ Result<Site> write_site(const SiteOptions& options) {
     return fail(ExitCode::kIo, "web.page", draft.page, "this folder contains no page",
                 "leave out --page, or name the folder that the preset web builds");
   }
+  if (options.baker && !fs::exists(draft.page + "/" + std::string(kBakerFiles[0]))) {
+    return fail(ExitCode::kUnsupported, "web.page", draft.page, "it contains no baker",
+                "scripts/wasm/package.sh FOLDER, then --page FOLDER; or npx modar web --baker");
+  }
   MODAR_TRY(choose_languages(draft));
   MODAR_TRY(read_texts(draft));
   MODAR_ASSIGN(const Json release, release_of(options, draft.page));
@@ -587,6 +600,7 @@ Result<Site> write_site(const SiteOptions& options) {
   Json site = {{"title", title}, {"languages", Json::list(draft.languages)}, {"bundles", bundles}};
   if (links.size() != 0) site.set("links", links);
   if (!release.is_null()) site.set("release", release);
+  if (options.baker) site.set("baker", true);
   if (!options.statement.empty()) {
     MODAR_ASSIGN(const Json statements, put_statements(draft, publisher, title));
     site.set("statements", statements);

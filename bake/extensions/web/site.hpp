@@ -28,6 +28,7 @@ struct SiteOptions {
   /// The newest release when the page is made: visitors' browsers believe none before it. 0: none.
   std::uint64_t release_epoch = 0;
   std::uint64_t release_version = 0;
+  bool baker = false;  ///< add what bakes models of visitors' own in their browsers
   bool live = false;   ///< open pages show later writes, a second after them
   std::string page;    ///< folder that the preset `web` built; empty: find_page()
   std::string output;  ///< folder, made if absent; see claim_output_folder()

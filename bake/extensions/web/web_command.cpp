@@ -123,6 +123,8 @@ void add_web(CommandLine& program) {
               {.type = "DIR"});
   line.flag("--room", options.room,
             "Add USDZ and GLB files, which iPhones and Android phones show in the visitor's room");
+  line.flag("--baker", options.baker,
+            "Visitors may open models of their own: adds the baker, 4 MB that they load then");
   line.option("--link", &options.links, "Link at the foot of the cover: 'Imprint=https://...'",
               {.type = "TEXT=URL"});
   line.option("--statement", &options.statement,

@@ -22,7 +22,8 @@ export {Camera, Recorder, View};  // as this page has them
  *     source?: () => Promise<any>}} Bundle
  * @typedef {{text: string, url: string, lang?: string}} Link
  * @typedef {{title: string, languages: string[], bundles: Bundle[], own?: Bundle[],
- *     release?: {url: string}, statements?: Record<string, Link>, links?: Link[]}} Site
+ *     release?: {url: string}, statements?: Record<string, Link>, links?: Link[],
+ *     baker?: boolean}} Site
  *
  * The elements that are more than an HTMLElement.
  * @typedef {{
@@ -175,7 +176,8 @@ async function chooseBundles() {
   site.own ??= site.bundles;
   site.bundles = installed ?? site.own;
   $('bundle').replaceChildren(...site.bundles.map(({title}, i) => new Option(title, `${i}`)));
-  $('choice').hidden = $('lists-open').hidden = site.bundles.length < 2;
+  $('choice').hidden = site.bundles.length < 2;
+  $('lists-open').hidden = $('choice').hidden && !site.baker;
 }
 
 const canKeep = () => !forgotten && 'serviceWorker' in navigator && globalThis.isSecureContext;
@@ -231,18 +233,32 @@ async function loadBundle(again = false) {
 async function openLists() {
   const {patterns, installed} = currentBundle();
   const lists = await import('./lists.js');
+  const choose = (/** @type {number} */ bundle) => {
+    viewer.stop();
+    $('bundle').selectedIndex = bundle;
+    showPlates();
+    press('start', () => viewer.start(loadBundle()));
+  };
   lists.openLists(
       {
         words,
         titles: site.bundles.map(({title}) => title),
         chosen: $('bundle').selectedIndex,
-        pictures: patterns.map(({title, image}) => ({title, image: addressOf(image, installed)})),
-        choose(bundle) {
-          viewer.stop();
-          $('bundle').selectedIndex = bundle;
-          showPlates();
-          press('start', () => viewer.start(loadBundle()));
-        },
+        pictures: patterns.map(
+            ({name, title, image}) => ({name, title, image: addressOf(image, installed)})),
+        choose,
+        open:
+            site.baker && ((title, bytes) => {
+              $('bundle').append(new Option(title, `${site.bundles.length}`));
+              choose(site.bundles.push({
+                title,
+                installed,
+                file: '',
+                hash: '',
+                patterns: patterns.map(({texts, usdz, glb, ...rest}) => ({...rest, models: title})),
+                source: async () => bytes.buffer
+              }) - 1);
+            }),
         look(pattern) {
           viewer.stop();
           press('look', () => viewer.look(pattern, loadBundle()));

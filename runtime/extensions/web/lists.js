@@ -1,13 +1,38 @@
 // @ts-check
-// Lists over the camera's picture, of a page with several bundles: what to show, and the pictures
-// that show it. Loaded by those who open them.
+// Lists over the camera's picture: what to show, and the pictures that show it. A model of the
+// visitor's own is baked onto these pictures, in the browser. Loaded by those who open them.
 
 /**
  * What app.js hands over.
  * @typedef {{words: Record<string, string>, titles: string[], chosen: number,
- *     pictures: {title: string, image: Promise<string>}[], choose: (bundle: number) => void,
- *     look: (pattern: number) => void, own: () => void}} Choices
+ *     pictures: {name: string, title: string, image: Promise<string>}[],
+ *     choose: (bundle: number) => void, look: (pattern: number) => void, own: () => void,
+ *     open?: false | ((title: string, bundle: Uint8Array) => void)}} Choices
  */
+
+const MODELS = /\.(obj|glb|gltf|ply|stl)$/i;
+
+/**
+ * files: a model and those that it names.
+ * @param {File[]} files
+ * @param {Choices['pictures']} pictures
+ * @param {{signal: AbortSignal, onProgress: (progress: {done: number}) => void}} run
+ * @returns {Promise<{title: string, bundle: Uint8Array}>}
+ */
+async function bakeModel(files, pictures, run) {
+  const {bake} = await import(new URL('./bake.js', import.meta.url).href);
+  const {name} = files.find((file) => MODELS.test(file.name)) ?? files[0];
+  /** @type {[string, Blob][]} */
+  const plates = await Promise.all(pictures.map(
+      async (picture) =>
+          [`pictures/${encodeURIComponent(picture.name)}.webp`,
+           await (await fetch(await picture.image)).blob()]));
+  const all = [...files.map((file) => [file.name, file]), ...plates];
+  const {bundle} = await bake(
+      Object.fromEntries(all), {tier: 'phone', model: name, pattern: plates.map(([file]) => file)},
+      run);
+  return {title: name.replace(MODELS, ''), bundle};
+}
 
 const STYLE = `
 #lists .row { flex-wrap: wrap; }
@@ -20,7 +45,7 @@ const STYLE = `
  * @param {Choices} choices
  * @param {typeof import('./viewer-parts.js').adopt} adopt
  */
-export function openLists({words, titles, chosen, pictures, choose, look, own}, adopt) {
+export function openLists({words, titles, chosen, pictures, choose, look, own, open: show}, adopt) {
   let dialog = /** @type {HTMLDialogElement | null} */ (document.getElementById('lists'));
   if (!dialog) {
     adopt(document, STYLE);
@@ -30,6 +55,8 @@ export function openLists({words, titles, chosen, pictures, choose, look, own}, 
     document.body.append(dialog);
   }
   const open = dialog;
+  const stop = new AbortController();
+  open.addEventListener('close', () => stop.abort(), {once: true});
   const button = (/** @type {string} */ text, /** @type {() => void} */ action, name = 'quiet') => {
     const made = document.createElement('button');
     Object.assign(made, {type: 'button', className: name, textContent: text});
@@ -65,5 +92,28 @@ export function openLists({words, titles, chosen, pictures, choose, look, own}, 
   open.replaceChildren(
       title, row(models), lead, row(plates),
       row([button(words.own, own), button(words.back, () => {}, '')]));
+  if (show) {
+    const told = Object.assign(document.createElement('output'), {className: 'small'});
+    // Of any kind: phones do not offer files of kinds that they do not know.
+    const files = Object.assign(document.createElement('input'), {type: 'file', multiple: true});
+    files.addEventListener('change', async () => {
+      const onProgress = ({done = 0}) => {
+        told.value = words.loading.replace('{percent}', String(Math.round(100 * done)));
+      };
+      onProgress({});
+      try {
+        const {title: name, bundle} =
+            await bakeModel([...files.files ?? []], pictures, {signal: stop.signal, onProgress});
+        open.close();
+        show(name, bundle);
+      } catch (error) {
+        const {cause = error, cure = ''} = /** @type {Record<string, string>} */ (error);
+        told.value = [cause, cure].filter(Boolean).join('; ');
+      }
+    });
+    const label = Object.assign(document.createElement('label'), {className: 'small'});
+    label.append(words.openModel, files);
+    open.lastElementChild?.before(label, told);
+  }
   open.showModal();
 }
