@@ -1062,14 +1062,6 @@ bool is_upright(const std::array<Point, 4>& corners) {
   return true;
 }
 
-/// Of the shapes that cameras have, and as large as they make them.
-bool has_camera_shape(double width, double height) {
-  constexpr double kShapes[] = {4.0 / 3, 3.0 / 2, 16.0 / 9};
-  const double shape = std::max(width, height) / std::min(width, height);
-  return std::max(width, height) >= kLeastPhoto &&
-         ranges::any_of(kShapes, [&](double one) { return std::fabs(shape / one - 1) < 0.005; });
-}
-
 }  // namespace
 
 Result<FoundCorners> find_corners(const RgbaImage& photo) {
@@ -1152,8 +1144,9 @@ bool shows_an_object(const RgbaImage& image) {
 FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found) {
   const double width = photo.image.width;
   const double height = photo.image.height;
+  const bool is_photo = std::max(width, height) >= kLeastPhoto && has_camera_shape(width, height);
   FoundPicture picture;
-  picture.doubt = photo.focal_px > 0 || has_camera_shape(width, height) ? "not-found" : "";
+  picture.doubt = photo.focal_px > 0 || is_photo ? "not-found" : "";
   const auto whole = [&] {
     if (shows_an_object(photo.image)) picture.doubt = "object";
     return picture;

@@ -7,6 +7,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "formats/base/ranges.hpp"
+
 namespace modar {
 namespace {
 
@@ -14,6 +16,8 @@ namespace {
 // and where the optical axis meets the picture.
 constexpr double kCornerSpread = 0.001;
 constexpr double kCentreSpread = 0.01;
+// The same of a cropped photo: places up to twice as far are tried. Higher: fewer shapes are known.
+constexpr double kCroppedCentre = 0.4;
 // Expected radial bend of a lens, of the cube of the distance from the axis. Higher trusts strong
 // perspective less. [0.1, 0.25]
 constexpr double kBendSpread = 0.25;
@@ -22,6 +26,9 @@ constexpr double kBendSpread = 0.25;
 constexpr double kUsualFocal = 0.8;
 constexpr double kUsualSpread = 0.15;
 constexpr double kExifSpread = 0.03;
+// The same of cropped photos.
+constexpr double kCroppedFocal = 1.6;
+constexpr double kCroppedSpread = 0.5;
 // A share of photos that are outliers: cropped, or of a long lens.
 constexpr double kOddShare = 0.01;
 constexpr double kOddSpread = 0.7;
@@ -29,6 +36,7 @@ constexpr double kOddSpread = 0.7;
 constexpr double kShortest = 0.3;
 constexpr double kLongest = 8.0;
 constexpr int kFocals = 200;
+constexpr int kCentres = 4;  // of a cropped photo, tried to each side of its middle
 
 /// Corners and optical centre, relative to the photo's middle, in shares of its longer side, and
 /// the lens's bend.
@@ -86,10 +94,11 @@ double normal_density(double value, double spread) {
 }
 
 /// How likely a focal length is before the corners are looked at; exif: 0 where it is not known.
-double prior(double focal, double exif) {
-  const double usual = exif > 0 ? exif : kUsualFocal;
+double prior(double focal, double exif, bool cropped) {
+  const double usual = exif > 0 ? exif : cropped ? kCroppedFocal : kUsualFocal;
+  const double spread = exif > 0 ? kExifSpread : cropped ? kCroppedSpread : kUsualSpread;
   const double off = std::log(focal / usual);
-  return (1 - kOddShare) * normal_density(off, exif > 0 ? kExifSpread : kUsualSpread) +
+  return (1 - kOddShare) * normal_density(off, spread) +
          kOddShare * normal_density(off, kOddSpread);
 }
 
@@ -100,8 +109,8 @@ struct Weighed {
   double variance = 0;
 };
 
-/// moved: the sides, with each number that is not known exactly off by its spread.
-Weighed weigh(const Sides& sides, const std::vector<Sides>& moved, double focal, double exif) {
+/// moved: the sides, with each number that is not known exactly off by its spread. usual: prior().
+Weighed weigh(const Sides& sides, const std::vector<Sides>& moved, double focal, double usual) {
   const Shape here = sides.shape(focal);
   double aspects = 0;  // variances and covariance
   double cosines = 0;
@@ -115,11 +124,40 @@ Weighed weigh(const Sides& sides, const std::vector<Sides>& moved, double focal,
     both += aspect * cosine;
   }
   // Aspect and variance given that the angle is right.
-  return {prior(focal, exif) * normal_density(here.cosine, std::sqrt(cosines)),
+  return {usual * normal_density(here.cosine, std::sqrt(cosines)),
           here.log_aspect - both / cosines * here.cosine, aspects - both * both / cosines};
 }
 
+/// What is known of a photo's focal length and centre.
+struct Known {
+  double exif = 0;    ///< focal length, of the longer side; or 0
+  double likely = 1;  ///< of the centre
+  bool cropped = false;
+};
+
+/// Adds all focal lengths of a view. unit: the longer side, pixels.
+void weigh_focals(const View& view, double unit, const Known& known, std::vector<Weighed>& all) {
+  std::vector<Sides> moved;
+  for (std::size_t k = 0; k < view.size(); ++k) {
+    View other = view;
+    other[k] += k < 8 ? std::max(kCornerSpread, 1 / unit) : k < 10 ? kCentreSpread : kBendSpread;
+    moved.emplace_back(other);
+  }
+  const Sides sides(view);
+  for (int i = 0; i < kFocals; ++i) {
+    const double focal = kShortest * std::pow(kLongest / kShortest, i / (kFocals - 1.0));
+    const double usual = prior(focal, known.exif, known.cropped);
+    all.push_back(weigh(sides, moved, focal, known.likely * usual));
+  }
+}
+
 }  // namespace
+
+bool has_camera_shape(double width, double height) {
+  constexpr double kShapes[] = {4.0 / 3, 3.0 / 2, 16.0 / 9};
+  const double shape = std::max(width, height) / std::min(width, height);
+  return ranges::any_of(kShapes, [&](double one) { return std::fabs(shape / one - 1) < 0.005; });
+}
 
 AspectEstimate estimate_aspect(const std::array<PixelPoint, 4>& corners, std::uint32_t width,
                                std::uint32_t height, double focal_px) {
@@ -129,20 +167,24 @@ AspectEstimate estimate_aspect(const std::array<PixelPoint, 4>& corners, std::ui
     view[2 * i] = (corners[i].x - 0.5 * (width - 1.0)) / unit;
     view[2 * i + 1] = (corners[i].y - 0.5 * (height - 1.0)) / unit;
   }
-  std::vector<Sides> moved;
-  for (std::size_t k = 0; k < view.size(); ++k) {
-    View other = view;
-    other[k] += k < 8 ? std::max(kCornerSpread, 1 / unit) : k < 10 ? kCentreSpread : kBendSpread;
-    moved.emplace_back(other);
-  }
+  const bool cropped = focal_px <= 0 && !has_camera_shape(width, height);
+  const int reach = cropped ? kCentres : 0;
   std::vector<Weighed> all;
+  for (int y = -reach; y <= reach; ++y) {
+    for (int x = -reach; x <= reach; ++x) {
+      View here = view;
+      here[8] = 2 * kCroppedCentre * x / kCentres;
+      here[9] = 2 * kCroppedCentre * y / kCentres;
+      const double likely =
+          normal_density(here[8], kCroppedCentre) * normal_density(here[9], kCroppedCentre);
+      weigh_focals(here, unit, {focal_px / unit, likely, cropped}, all);
+    }
+  }
   double total = 0;
   double mean = 0;
-  for (int i = 0; i < kFocals; ++i) {
-    const double focal = kShortest * std::pow(kLongest / kShortest, i / (kFocals - 1.0));
-    all.push_back(weigh(Sides(view), moved, focal, focal_px / unit));
-    total += all.back().weight;
-    mean += all.back().weight * all.back().log_aspect;
+  for (const Weighed& one : all) {
+    total += one.weight;
+    mean += one.weight * one.log_aspect;
   }
   mean /= total;
   double variance = 0;

@@ -28,8 +28,8 @@ struct ContentOptions {
 bool check_content(const BundleView& bundle, const IssueSink& sink,
                    const ContentOptions& options = {});
 
-/// All rules that need no source: check_whole(), and check_content() of sound bytes. Answers true if
-/// the bytes are sound.
+/// All rules that need no source: check_whole(), and check_content() of sound bytes. Answers true
+/// if the bytes are sound.
 bool check_all(std::span<const std::byte> bytes, const DeviceProfile* device, unsigned jobs,
                const IssueSink& sink);
 
