@@ -14,7 +14,7 @@ cmp "$root"/build/wasm/bin/baker{,-module}.wasm
 mkdir "$out/bin/module"
 cp "$root/build/wasm/bin/baker-module.js" "$out/bin/module/baker.js"
 echo '{ "type": "module" }' >"$out/bin/module/package.json"
-cp "$root"/bake/extensions/wasm/{bake.js,bake.d.ts,bake-worker.js} "$out"
+cp "$root"/bake/extensions/wasm/{bake.js,bake.d.ts,bake-worker.js,platform.js} "$out"
 node "$out/bin/modar" document -o "$out/documents"
 mv "$out/documents/modar/commands.d.ts" "$out"
 rm -r "$out/documents"

@@ -51,7 +51,7 @@ class Types(unittest.TestCase):
                 (pathlib.Path(folder) / f"{code}.js").write_text("// @ts-check\n" + text)
             laid = pathlib.Path(folder) / "laid"
             laid.mkdir()
-            for file in [*(ROOT / "runtime/extensions/web").glob("*.*s"), *LIBRARY.glob("bake*.*s")]:
+            for file in [*(ROOT / "runtime/extensions/web").glob("*.*s"), *LIBRARY.glob("bake*.*s"), LIBRARY / "platform.js"]:
                 shutil.copy(file, laid)
             subprocess.run([BIN / "modar", "document", "-o", laid / "documents"], check=True)
             shutil.copy(laid / "documents/modar/commands.d.ts", laid)

@@ -1,9 +1,6 @@
 // @ts-check
 // One run of `modar` in a worker of bake.js: on files in memory, in a folder of its own.
-
-const IN_NODE = Boolean(/** @type {any} */ (globalThis).process?.versions?.node);
-/** @param {string} name of a module of Node, which bundlers for browsers must not look for */
-const nodeModule = (name) => import(/* webpackIgnore: true */ /* @vite-ignore */ `node:${name}`);
+import {IN_NODE, nodeModule} from './platform.js';
 
 const FOLDER = '/work';
 

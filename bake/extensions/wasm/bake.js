@@ -2,6 +2,7 @@
 // `modar` as a library, in Node and in browsers: bytes in, bytes out. Each call runs in a worker of its own, so that a page stays
 // responsive and a call can be stopped.
 import {ModarError} from './engine.js';
+import {IN_NODE, nodeModule} from './platform.js';
 
 export {ModarError};
 
@@ -12,10 +13,6 @@ export {ModarError};
  * @typedef {Record<string, unknown>} Options
  * @typedef {{status: number, stdout: string, stderr: string, files: Record<string, Uint8Array>}} Outcome
  */
-
-const IN_NODE = Boolean(/** @type {any} */ (globalThis).process?.versions?.node);
-/** @param {string} name of a module of Node, which bundlers for browsers must not look for */
-const nodeModule = (name) => import(/* webpackIgnore: true */ /* @vite-ignore */ `node:${name}`);
 
 /** @type {Promise<WebAssembly.Module> | undefined} */
 let program;

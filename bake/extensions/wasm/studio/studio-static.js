@@ -72,6 +72,7 @@ async function openWorker() {
   const waiting = new Map();
   let last = 0;
   navigator.serviceWorker.addEventListener('message', ({data, ports}) => {
+    if (data.owner) return ports[0].postMessage({});
     if (!data.call) return;
     waiting.set(++last, ports[0]);
     worker.postMessage({id: last, call: data.call});

@@ -35,6 +35,32 @@ scope.addEventListener('activate', (/** @type {any} */ event) => {
   })());
 });
 
+const CLOSED = {
+  error: 'no tab of this browser has the studio open',
+  cure: 'open the studio, and try again',
+  code: 'studio.closed',
+};
+
+/** Milliseconds in which the tab that has the project says so. */
+const OWNER_MS = 20_000;
+/** Of the tab that has the project, while it lives. */
+let ownerId = '';
+
+/** @returns {Promise<any>} the tab that has the project */
+async function owner() {
+  const known = ownerId && await scope.clients.get(ownerId);
+  if (known) return known;
+  const tabs = await scope.clients.matchAll({type: 'window'});
+  const asked = tabs.map((/** @type {any} */ tab) => new Promise((resolve) => {
+    const {port1, port2} = new MessageChannel();
+    port1.onmessage = () => resolve(tab);
+    tab.postMessage({owner: true}, [port2]);
+  }));
+  const tab = await Promise.race([...asked, new Promise((resolve) => { setTimeout(resolve, OWNER_MS); })]);
+  if (tab) ownerId = tab.id;
+  return tab;
+}
+
 /**
  * @param {Request} request
  * @param {string} path below the page's folder
@@ -48,14 +74,12 @@ async function ask(request, path, query) {
     body: request.method === 'POST' ? await request.text() : '',
     upload: request.method === 'PUT' ? await request.blob() : undefined,
   };
-  // The tab that has the project answers; others do not listen.
-  const tabs = await scope.clients.matchAll({type: 'window'});
+  const tab = await owner();
+  if (!tab) return new Response(JSON.stringify(CLOSED), {status: 503, headers: {'Content-Type': 'application/json'}});
   const {status, type, headers, body} = await new Promise((resolve) => {
-    for (const tab of tabs) {
-      const {port1, port2} = new MessageChannel();
-      port1.onmessage = ({data}) => resolve(data);
-      tab.postMessage({call}, [port2]);
-    }
+    const {port1, port2} = new MessageChannel();
+    port1.onmessage = ({data}) => resolve(data);
+    tab.postMessage({call}, [port2]);
   });
   return new Response(body, {status, headers: {...headers, 'Content-Type': type}});
 }
