@@ -19,6 +19,7 @@ cmp "$root"/build/wasm/bin/baker{,-module}.wasm
 cp "$root/build/wasm/bin/baker.wasm" "$out/baker"
 cp "$root/build/wasm/bin/baker-module.js" "$out/baker/baker.js"
 cp "$root"/bake/extensions/wasm/studio/*.js "$out"
+sed -i "s/MODAR_PROGRAM_BYTES/$(stat -c %s "$out/baker/baker.wasm")/" "$out/studio-static.js"
 python3 - "$page/index.html" "$out" "$archive" <<'END'
 import hashlib, json, pathlib, sys, zipfile
 index, out, archive = map(pathlib.Path, sys.argv[1:])

@@ -61,7 +61,7 @@ class Types(unittest.TestCase):
             for file in (LIBRARY / "studio").glob("*.js"):
                 shutil.copy(file, laid)
             files = [ROOT / "tests/house/browser.d.ts", *laid.glob("studio-*.js"), laid / "bake.js", laid / "bake-worker.js", laid / "use.ts", *pathlib.Path(folder).glob("*.js"), *(file for file in modules() if file.name not in GENERATED)]
-            project.write_text(json.dumps({"compilerOptions": OPTIONS, "files": [str(file) for file in files]}))
+            project.write_text(json.dumps({"compilerOptions": {**OPTIONS, "rootDirs": [str(laid), str(ROOT / "bake/extensions/studio/page")]}, "files": [str(file) for file in files]}))
             told = subprocess.run([TSC, "-p", project], cwd=ROOT, capture_output=True, text=True).stdout.splitlines()
         planted = [line for line in told if any(f"{code}.js" in line for code in WRONG)]
         self.assertEqual(sorted(re.search(r"error (TS\d+)", line)[1] for line in planted), sorted(WRONG), told)

@@ -206,6 +206,7 @@ class Server(StudioTest):
         rooms = ("extensions/studio", "project", "bundle", "options", "import", "image", "mesh", "texture", "pattern", "video", "io", "memory", "extensions/web", "ship")
         text = "".join(path.read_text() for room in rooms for path in (ROOT / "bake" / room).rglob("*.?pp"))
         text += "".join(path.read_text() for folder in ("formats/base", "runtime/platform", "runtime/record") for path in (ROOT / folder).rglob("*.cpp"))
+        text += "".join(path.read_text().replace("'", '"') for path in (ROOT / "bake/extensions/wasm/studio").glob("*.js"))
         codes = set(re.findall(r'(?:ExitCode::\w+,\s*|wrong\w*\(|bad_\w+\(|not_read\()"([a-z]+\.[a-z0-9-]+)"', text))
         codes -= {code for code in codes if code.startswith(("calibrate.", "camera.", "confusion.", "pictures.", "simulate."))}  # of commands that the page does not have
         codes |= set(re.findall(r'"([a-z]+\.[a-z0-9-]+)",\s*DiagnosticSeverity::kWarning', text))

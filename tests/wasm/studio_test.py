@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 import zipfile
 
@@ -49,9 +50,17 @@ class StaticStudio(unittest.TestCase):
         return json.loads(self.browser.run("fetch('api/project').then((answer) => answer.text())"))
 
     def drop(self, *files):
-        root = self.browser.call("DOM.getDocument")["root"]["nodeId"]
-        node = self.browser.call("DOM.querySelector", nodeId=root, selector="input[type=file]")["nodeId"]
-        self.browser.call("DOM.setFileInputFiles", files=[str(ASSETS / file) for file in files], nodeId=node)
+        self.choose("input[type=file]", *(ASSETS / file for file in files))
+
+    def choose(self, selector, *files):
+        for last in (False, False, True):
+            root = self.browser.call("DOM.getDocument")["root"]["nodeId"]
+            node = self.browser.call("DOM.querySelector", nodeId=root, selector=selector)["nodeId"]
+            try:
+                return self.browser.call("DOM.setFileInputFiles", files=list(map(str, files)), nodeId=node)
+            except RuntimeError:  # it has been drawn anew meanwhile
+                if last:
+                    raise
 
     def baked(self):
         self.browser.wait("fetch('api/project').then((answer) => answer.json()).then(({bundle, baking}) => "
@@ -107,6 +116,86 @@ class StaticStudio(unittest.TestCase):
         self.browser.wait(STARTED, "the studio without a server", 120)
         after = self.project()
         self.assertEqual([after[key] for key in ("revision", "patterns", "files")], [before[key] for key in ("revision", "patterns", "files")])
+
+    def restart(self):
+        """The browser ends without a word, and comes back."""
+        self.browser.process.kill()
+        self.browser.process.wait()
+        self.browser = self.start("profile")
+
+    def wait_for_page(self, condition, what):
+        """While the page is loaded anew, it answers nothing."""
+        for _ in range(1200):
+            try:
+                if self.browser.run(f"!globalThis.before && {STARTED} && {condition}"):
+                    return
+            except RuntimeError:
+                pass
+            time.sleep(0.1)
+        raise AssertionError(f"{what} did not happen; console: {self.browser.errors}")
+
+    def press(self, label):
+        self.browser.run("document.querySelector('.projects') || document.querySelector('button.project').click()")
+        find = f"[...document.querySelectorAll('.projects button')].find((button) => button.textContent === {label!r})"
+        self.browser.wait(f"Boolean({find})", label)
+        self.browser.run("globalThis.before = true")
+        self.browser.run(f"{find}.click()")
+        self.wait_for_page("true", f"the page after {label}")
+
+    def test_projects_have_names_and_folders_and_come_back_from_archives(self):
+        self.drop("patterns/cover.png")
+        self.browser.wait("fetch('api/project').then((answer) => answer.json()).then(({patterns}) => patterns.length === 1)", "the picture")
+        self.browser.run("document.querySelector('button.project').click()")
+        self.browser.wait("Boolean(document.querySelector('.projects input'))", "the menu")
+        self.browser.run("(() => { const name = document.querySelector('.projects input'); name.value = 'Haus am Fluß'; "
+                         "name.dispatchEvent(new Event('change')); })()")
+        self.browser.wait("document.querySelector('button.project').innerText === 'Haus am Fluß'", "the name")
+        before = self.project()
+        archive = self.base / "Fluß.zip"
+        with zipfile.ZipFile(archive, "w") as packed:
+            packed.write(ASSETS / "patterns/cover.png", "cover.png")
+            packed.writestr("modar.toml", '[project]\nname = "from afar"\n[[pattern]]\nfile = "cover.png"\nwidth = "210mm"\n')
+        self.choose(".projects input[type=file]", archive)
+        self.wait_for_page("document.querySelector('button.project').innerText === 'from afar'", "the archive's project")
+        self.assertEqual([pattern["width_mm"] for pattern in self.project()["patterns"]], [210])
+        # The person grants a folder, here one of the browser's own.
+        self.browser.run("globalThis.showDirectoryPicker = async () => (await navigator.storage.getDirectory()).getDirectoryHandle('granted', {create: true})")
+        self.press("Open a folder of this computer")
+        self.assertEqual((self.project()["name"], self.project()["patterns"]), ("granted", []))
+        self.drop("patterns/game.png")
+        granted = ("navigator.storage.getDirectory().then((root) => root.getDirectoryHandle('granted')).then((folder) => folder.getFileHandle('{}'))"
+                   ".then((file) => file.getFile()).then((file) => file.size, () => 0)")
+        self.browser.wait(granted.format("game.png") + f".then((size) => size === {(ASSETS / 'patterns/game.png').stat().st_size})", "the picture in the folder")
+        self.browser.wait(granted.format("modar.toml"), "modar.toml in the folder")
+        self.press("project")
+        self.assertEqual([self.project()[key] for key in ("name", "revision", "patterns")], [before[key] for key in ("name", "revision", "patterns")])
+
+    def quota(self, **size):
+        self.browser.call("Storage.overrideQuotaForOrigin", origin=self.server.url.rstrip("/"), **size)
+
+    def test_a_full_disk_is_told_and_nothing_is_lost(self):
+        self.drop("patterns/cover.png")
+        self.browser.wait("fetch('api/project').then((answer) => answer.json()).then(({patterns}) => patterns.length === 1)", "the picture")
+        self.quota(quotaSize=1000)
+        self.drop("patterns/game.png")
+        self.browser.wait("document.querySelector('.notice.bad')?.innerText.includes('no more room')", "the message")
+        self.quota()
+        self.drop("patterns/poems.png")
+        self.browser.wait("fetch('api/project').then((answer) => answer.json()).then(({patterns}) => patterns.length === 3)", "the third picture")
+        before = self.project()
+        self.restart()
+        after = self.project()
+        self.assertEqual([after[key] for key in ("revision", "patterns", "files")], [before[key] for key in ("revision", "patterns", "files")])
+
+    def test_closing_in_a_bake_loses_nothing(self):
+        self.drop(*FILES)
+        self.browser.wait("fetch('api/project').then((answer) => answer.json()).then(({baking}) => baking)", "the job")
+        before = self.project()
+        self.restart()
+        after = self.project()
+        self.assertEqual([after[key] for key in ("revision", "patterns", "models", "files")], [before[key] for key in ("revision", "patterns", "models", "files")])
+        self.browser.run("fetch('api/bake', {method: 'POST', body: '{}'})")
+        self.baked()
 
     def test_a_second_tab_says_so(self):
         self.browser.run("navigator.locks.query().then(({held}) => held.length)")

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "bake/extensions/studio/archive.hpp"
 #include "bake/extensions/studio/phone.hpp"
 #include "bake/extensions/studio/session.hpp"
 #include "bake/extensions/wasm/studio_job.hpp"
@@ -61,6 +62,12 @@ extern "C" EMSCRIPTEN_KEEPALIVE void studio_open(const char* folder, unsigned jo
   modar::studio = std::make_unique<modar::Studio>(folder);
   // Without it nothing can be kept, which the first upload reports.
   static_cast<void>(modar::make_output_folder(modar::studio->session.own));
+}
+
+/// The files of a project that was exported, into its folder. Answers null, or the error.
+extern "C" EMSCRIPTEN_KEEPALIVE const char* studio_unpack(const char* archive, const char* folder) {
+  const auto names = modar::unpack_zip(archive, folder);
+  return modar::returned(names ? modar::Json() : modar::json_of(names.error()));
 }
 
 /// request: {"method", "path", "query": {name: value}, "body", "upload"}, as in Call. Answers

@@ -107,7 +107,8 @@ function bar(now, pattern) {
   return m(
       'header.bar',
       m('div.brand', m('img', {src: 'engine/icon.svg', alt: '', width: 28, height: 28}),
-        m('bdi', {title: project.folder}, project.name)),
+        window.modarStatic ? m(window.modarStatic.Projects) :
+                             m('bdi', {title: project.folder}, project.name)),
       steps(now, pattern),
       m('div.tools', m('div.state', {role: 'status'}, status()),
         tool(t('undo'), 'undo', undo, {disabled: !project.undo, 'aria-keyshortcuts': 'Control+Z'}),

@@ -2,6 +2,8 @@
 
 interface Window {
   m: Studio.Mithril;
+  /** Of a static page, which has no server. */
+  modarStatic?: { kept: boolean; chosen: { name: string; folder?: object }; Projects: any };
 }
 
 declare namespace Studio {

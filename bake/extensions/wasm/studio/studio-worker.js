@@ -5,9 +5,12 @@ import load from './baker/baker.js';
 
 /** @typedef {{method: string, path: string, query: Record<string, string>, body?: string, upload?: Blob}} Call */
 
-const FOLDER = '/project';
+/** Of the project: its last part is the project's name until modar.toml says another. */
+let folder = '';
 /** Of the page that `modar web` copies. */
 const PAGE = '/modar';
+/** A browser's memory is 4 GB at most, and a bake needs as much again. */
+const MOST_BYTES = 2e9;
 /** Requests that start a job. */
 const JOBS = new Set(['api/bake', 'api/export']);
 
@@ -47,18 +50,31 @@ async function start(program, jobNumber = 0) {
     },
   };
   modar = await load(modar);
-  modar.FS.mkdirTree(FOLDER);
+  modar.FS.mkdirTree(folder);
   modar.FS.mkdirTree(`${PAGE}/bin`);
+  keepStamps();
+}
+
+/** Bundles are known again by time and inode, which their copies in jobs and in later visits must share. */
+function keepStamps() {
+  const probe = `${PAGE}/probe`;
+  modar.FS.writeFile(probe, '');
+  const {node_ops: operations} = modar.FS.lookupPath(probe).node;
+  modar.FS.unlink(probe);
+  const {getattr} = operations;
+  const time = new Date(0);
+  operations.getattr = (/** @type {any} */ node) =>
+      (/^(?![0-9a-f]{32}\.).*\.modar$/.test(node.name) ? {...getattr(node), ino: 1, mtime: time, ctime: time} : getattr(node));
 }
 
 /**
  * All files below a folder of the module, with their nodes.
  * @returns {Generator<[string, any]>}
  */
-function* files(folder = FOLDER) {
-  for (const name of modar.FS.readdir(folder)) {
+function* files(from = folder) {
+  for (const name of modar.FS.readdir(from)) {
     if (name === '.' || name === '..') continue;
-    const path = `${folder}/${name}`;
+    const path = `${from}/${name}`;
     const {node} = modar.FS.lookupPath(path);
     if (modar.FS.isDir(node.mode)) yield* files(path);
     else yield [path, node];
@@ -106,62 +122,111 @@ function putFiles(list) {
 // ---- the private file system ----
 
 /**
- * @param {string} path of a file in FOLDER
+ * @param {string} path of a file of the project
  * @param {boolean} create
  * @returns {Promise<[FileSystemDirectoryHandle, string]>}
  */
 async function place(path, create) {
-  const parts = path.slice(FOLDER.length + 1).split('/');
+  const parts = path.slice(folder.length + 1).split('/');
   const name = /** @type {string} */ (parts.pop());
-  let folder = /** @type {FileSystemDirectoryHandle} */ (disk);
-  for (const part of parts) folder = await folder.getDirectoryHandle(part, {create});
-  return [folder, name];
+  let place = /** @type {FileSystemDirectoryHandle} */ (disk);
+  for (const part of parts) place = await place.getDirectoryHandle(part, {create});
+  return [place, name];
 }
 
-/** @param {Map<string, Uint8Array | null>} changed */
+/**
+ * The old file stays until the new one is complete.
+ * @param {any} file
+ * @param {Uint8Array} bytes
+ */
+async function store(file, bytes) {
+  if (file.createWritable) {
+    const writing = await file.createWritable();
+    try {
+      await writing.write(bytes);
+      return await writing.close();
+    } catch (error) {
+      await writing.abort().catch(() => {});
+      throw error;
+    }
+  }
+  const access = await file.createSyncAccessHandle();  // older browsers, in their own file system alone
+  try {
+    access.truncate(bytes.length);
+    for (let at = 0; at < bytes.length;) at += access.write(bytes.subarray(at), {at});
+    access.flush();
+  } finally { access.close(); }
+}
+
+/** modar.toml, which names the others, is the last. */
+const inOrder = (/** @type {Map<string, Uint8Array | null>} */ changed) =>
+    [...changed].sort(([a], [b]) => Number(a.endsWith('/modar.toml')) - Number(b.endsWith('/modar.toml')));
+
+/**
+ * What cannot be stored is tried again with the next change.
+ * @param {Map<string, Uint8Array | null>} changed
+ */
 async function keep(changed) {
   if (!disk) return;
-  for (const [path, bytes] of changed) {
-    const [folder, name] = await place(path, bytes !== null);
-    if (!bytes) {
-      await folder.removeEntry(name).catch(() => {});
-      continue;
+  const left = new Map(inOrder(changed));
+  try {
+    for (const [path, bytes] of [...left]) {
+      const [where, name] = await place(path, bytes !== null);
+      if (bytes) await store(await where.getFileHandle(name, {create: true}), bytes);
+      else await where.removeEntry(name).catch(() => {});
+      left.delete(path);
     }
-    const file = /** @type {any} */ (await folder.getFileHandle(name, {create: true}));
-    const access = await file.createSyncAccessHandle();
-    try {
-      access.truncate(bytes.length);
-      for (let at = 0; at < bytes.length;) at += access.write(bytes.subarray(at), {at});
-      access.flush();
-    } finally { access.close(); }
+  } catch (error) {
+    for (const [path, bytes] of left) {
+      if (bytes) stored.delete(path);
+      else stored.set(path, '');
+    }
+    throw error;
   }
 }
 
 /**
- * @param {FileSystemDirectoryHandle} folder
+ * @param {FileSystemDirectoryHandle} from
  * @returns {AsyncGenerator<[string, FileSystemFileHandle]>}
  */
-async function* kept(folder, path = FOLDER) {
-  for await (const [name, handle] of /** @type {any} */ (folder).entries()) {
-    if (handle.kind === 'directory') yield* kept(handle, `${path}/${name}`);
-    else yield [`${path}/${name}`, handle];
+async function* kept(from, path = folder) {
+  for await (const [name, handle] of /** @type {any} */ (from).entries()) {
+    if (handle.kind === 'file') yield [`${path}/${name}`, handle];
+    else if (name === '.modar' || !/^\.|^node_modules$/.test(name)) yield* kept(handle, `${path}/${name}`);
   }
 }
 
-async function openDisk() {
+/** @param {{name: string, folder?: FileSystemDirectoryHandle}} chosen */
+async function openDisk(chosen) {
   try {
-    const root = await navigator.storage.getDirectory();
-    disk = await root.getDirectoryHandle('modar-studio', {create: true});
-    const probe = /** @type {any} */ (await root.getFileHandle('modar-probe', {create: true}));
-    (await probe.createSyncAccessHandle()).close();
-  } catch {
+    disk = chosen.folder ?? null;
+    if (!disk) {
+      const root = await navigator.storage.getDirectory();
+      disk = await (await root.getDirectoryHandle('modar-projects', {create: true})).getDirectoryHandle(chosen.name, {create: true});
+      await store(await root.getFileHandle('modar-probe', {create: true}), new Uint8Array(1));
+    }
+  } catch (error) {
+    if (chosen.folder) throw error;
     disk = null;
     return;
   }
+  let bytes = 0;
   for await (const [path, handle] of kept(disk)) {
-    putFiles([[path, new Uint8Array(await (await handle.getFile()).arrayBuffer())]]);
+    const file = await handle.getFile();
+    bytes += file.size;
+    if (bytes > MOST_BYTES) throw new Error(`${disk.name} has more than 2 GB: open a folder with the project's files alone`);
+    putFiles([[path, new Uint8Array(await file.arrayBuffer())]]);
   }
   changes();
+}
+
+/** A project that was exported comes as one file. */
+function unpack() {
+  const archive = `${folder}/import.zip`;
+  if (!modar.FS.analyzePath(archive).exists) return;
+  const wrong = JSON.parse(modar.ccall('studio_unpack', 'string', ['string', 'string'], [archive, folder]));
+  modar.FS.unlink(archive);
+  if (wrong) self.postMessage({notice: wrong});
 }
 
 // ---- calls ----
@@ -177,17 +242,25 @@ function ask(call) {
 }
 
 const ROOM = {
-  error: 'the browser gives this page no more room',
-  cure: 'free space on this device, or export the project and remove files from it',
+  error: 'the browser gives this page no more room: the last change is not kept',
+  cure: 'free space on this device, or export the project and remove files from it; the next change is kept with it',
   code: 'studio.room',
 };
 
 /** @param {unknown} error */
+const isFull = (error) => error instanceof Error && error.name === 'QuotaExceededError';
+
+/**
+ * @param {unknown} error
+ * @returns {{error: string, cure: string, code: string}}
+ */
+const wrongOf = (error) =>
+    isFull(error) ? ROOM : {error: error instanceof Error ? error.message : String(error), cure: 'try again', code: 'studio.page'};
+
+/** @param {unknown} error */
 function failed(error) {
-  const full = error instanceof Error && error.name === 'QuotaExceededError';
-  const told = full ? ROOM : {error: error instanceof Error ? error.message : String(error), cure: 'try again', code: 'studio.page'};
-  const body = new TextEncoder().encode(JSON.stringify(told));
-  return {status: full ? 507 : 500, type: 'application/json', headers: {}, body};
+  const body = new TextEncoder().encode(JSON.stringify(wrongOf(error)));
+  return {status: isFull(error) ? 507 : 500, type: 'application/json', headers: {}, body};
 }
 
 /** @param {Call} call */
@@ -195,7 +268,7 @@ async function answer(call) {
   try {
     if (JOBS.has(call.path) && call.method === 'POST' && call.body?.includes('"kind"')) await loadPage();
     if (call.upload) {
-      const path = `${FOLDER}/.modar/studio/incoming-page`;
+      const path = `${folder}/.modar/studio/incoming-page`;
       modar.FS.writeFile(path, new Uint8Array(await call.upload.arrayBuffer()));
       const done = ask({...call, upload: path});
       if (modar.FS.analyzePath(path).exists) modar.FS.unlink(path);
@@ -255,6 +328,7 @@ function startJob(mine, call) {
   const page = pageLoaded ? [...files(PAGE)] : [];
   worker.postMessage({
     job: mine.number,
+    folder,
     call,
     compiled,
     files: [...files(), ...page].map(([path, node]) => [path, bytesOf(node)]),
@@ -277,7 +351,7 @@ async function jobTold(mine, {events, files: made, ended, broken}) {
   if (broken !== undefined) return jobFailed(mine, broken);
   if (made) {
     putFiles(made);
-    await keep(changes());
+    await keep(changes()).catch((error) => self.postMessage({notice: wrongOf(error)}));
   }
   if (ended !== undefined) {
     mine.ended = true;
@@ -321,21 +395,24 @@ function endJob() {
 /** @param {any} data */
 async function beginJob(data) {
   isJob = true;
+  ({folder} = data);
   await start(data.compiled, data.job);
   putFiles(data.files);
   changes();
-  modar.ccall('studio_open', null, ['string', 'number'], [FOLDER, data.job]);
+  modar.ccall('studio_open', null, ['string', 'number'], [folder, data.job]);
   ask(data.call);
   const ended = modar.ccall('studio_baked_scenes', 'string', [], []);
   self.postMessage({events: newEvents(), files: changes(), ended});
 }
 
-/** @param {WebAssembly.Module} program */
-async function beginPage(program) {
+/** @param {{program: WebAssembly.Module, chosen: {name: string, folder?: FileSystemDirectoryHandle}}} begin */
+async function beginPage({program, chosen}) {
+  folder = `/work/${chosen.name}`;
   await start(program);
-  await openDisk();
-  modar.ccall('studio_open', null, ['string', 'number'], [FOLDER, 0]);
-  await keep(changes());
+  await openDisk(chosen);
+  modar.ccall('studio_open', null, ['string', 'number'], [folder, 0]);
+  unpack();
+  await keep(changes()).catch((error) => self.postMessage({notice: wrongOf(error)}));
   self.postMessage({ready: true, kept: disk !== null});
 }
 
@@ -343,7 +420,7 @@ self.onmessage = ({data}) => {
   if (data.job) {
     beginJob(data).catch((error) => self.postMessage({events: [], broken: String(error)}));
   } else if (data.program) {
-    queue = beginPage(data.program).catch((error) => self.postMessage({error: String(error)}));
+    queue = beginPage(data).catch((error) => self.postMessage({error: String(error)}));
   } else {
     queue = queue.then(async () => {
       const done = await answer(data.call);
