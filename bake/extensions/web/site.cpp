@@ -69,7 +69,7 @@ constexpr std::array<std::string_view, 3> kUpdateFiles = {"engine-update.js", "e
                                                           "update-worker.js"};
 
 /// What bakes visitors' models: of the npm package, requested when one is opened.
-constexpr std::array<std::string_view, 4> kBakerFiles = {"bake.js", "bake-worker.js",
+constexpr std::array<std::string_view, 5> kBakerFiles = {"bake.js", "bake-worker.js", "platform.js",
                                                          "bin/baker.wasm", "bin/module/baker.js"};
 
 struct Draft {
