@@ -186,6 +186,28 @@ TEST(Clips, MovementStatesItsErrorAndBoxes) {
     };
     EXPECT_TRUE(std::any_of(fitted.boxes.begin(), fitted.boxes.end(), inside));
   }
+  // Each corner at each sample, with shares as stored.
+  SourceModel stored = model;
+  for (VertexBones& shares : stored.vertex_bones) {
+    const auto bytes = shares.bytes();
+    for (std::size_t k = 0; k < 4; ++k) shares.weights[k] = static_cast<float>(bytes[k]) / 255.0f;
+  }
+  const SourceClip& clip = model.movement.clips[0];
+  ClipTracksView view;
+  view_clip_tracks(fitted.clips[0].fitted.bytes,
+                   static_cast<std::uint32_t>(model.movement.joints.size()), view);
+  const std::uint32_t samples = view.header->sample_count;
+  std::vector<std::uint32_t> keys;
+  double most = 0;
+  for (std::uint32_t i = 0; i < samples; ++i) {
+    const auto pose = clip_pose(model.movement.joints, clip, clip.duration * i / (samples - 1));
+    const auto kept = tracks_pose(model.movement.joints, view, i, keys);
+    for (std::size_t c = 0; c < model.corner_count(); ++c) {
+      most = std::max(
+          most, glm::distance(posed(model, pose, c / 3, c % 3), posed(stored, kept, c / 3, c % 3)));
+    }
+  }
+  EXPECT_NEAR(fitted.clips[0].fitted.error, most, 1e-7);
 }
 
 /// A file with a part of its text replaced.
