@@ -317,19 +317,7 @@ int GlbBuilder::add_skin(const PartRecord& part) {
 
 void GlbBuilder::add_bones(const LayoutRecord& layout, const PartRecord& part,
                            const DecodedLevel& level, tinygltf::Primitive& primitive) {
-  const AttributeRecord* joints = find_attribute(layout, Semantic::kJoints);
-  const AttributeRecord* weights = find_attribute(layout, Semantic::kWeights);
-  std::vector<std::uint8_t> bones;
-  std::vector<float> shares;
-  for (const std::byte* vertex : level.vertices) {
-    for (std::uint32_t k = 0; k < 4; ++k) {
-      const double share =
-          part.rigid() ? (k == 0 ? 1.0 : 0.0) : decode_component(*weights, vertex, k);
-      const double bone = part.rigid() || share == 0 ? 0.0 : decode_component(*joints, vertex, k);
-      bones.push_back(static_cast<std::uint8_t>(bone));
-      shares.push_back(static_cast<float>(share));
-    }
-  }
+  const auto [bones, shares] = vertex_shares(layout, part, level);
   primitive.attributes["JOINTS_0"] =
       add_accessor(add_view(bones.data(), bones.size(), TINYGLTF_TARGET_ARRAY_BUFFER),
                    TINYGLTF_TYPE_VEC4, TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE, bones.size() / 4);
@@ -479,6 +467,23 @@ Result<std::vector<std::byte>> guarded_build(const BundleView& bundle, Build&& b
 }
 
 }  // namespace
+
+VertexShares vertex_shares(const LayoutRecord& layout, const PartRecord& part,
+                           const DecodedLevel& level) {
+  const AttributeRecord* joints = find_attribute(layout, Semantic::kJoints);
+  const AttributeRecord* weights = find_attribute(layout, Semantic::kWeights);
+  VertexShares result;
+  for (const std::byte* vertex : level.vertices) {
+    for (std::uint32_t k = 0; k < 4; ++k) {
+      const bool one = part.bone_count == 1;
+      const double share = one ? (k == 0 ? 1.0 : 0.0) : decode_component(*weights, vertex, k);
+      const double bone = one || share == 0 ? 0.0 : decode_component(*joints, vertex, k);
+      result.bones.push_back(static_cast<std::uint8_t>(bone));
+      result.shares.push_back(static_cast<float>(share));
+    }
+  }
+  return result;
+}
 
 double roughness_of(float shininess) {
   const double exponent = std::max(0.0, static_cast<double>(shininess));

@@ -29,6 +29,7 @@ struct GlbImage {
 struct RoomModel {
   std::uint32_t model = 0;
   glm::dmat4 place{1.0};
+  std::uint32_t clip = kNone;  ///< that plays
 };
 
 /// The finest level of a chunk, decoded; only the vertices that it uses, in their order.
@@ -43,6 +44,14 @@ struct DecodedLevel {
 /// Errors: kInvalidInput "model.index" where an index exceeds its vertices.
 Result<DecodedLevel> decode_level(const BundleView& bundle, const LayoutRecord& layout,
                                   const ChunkRecord& chunk);
+
+/// Of each vertex of a part that moves: four bones of the part, and their shares.
+struct VertexShares {
+  std::vector<std::uint8_t> bones;
+  std::vector<float> shares;
+};
+VertexShares vertex_shares(const LayoutRecord& layout, const PartRecord& part,
+                           const DecodedLevel& level);
 
 /// The roughness whose highlight is as wide as that of the Phong exponent.
 double roughness_of(float shininess);
@@ -74,7 +83,8 @@ Result<std::vector<std::byte>> encode_glb(const BundleView& bundle,
 
 /// A stored ZIP of a scene description as text (Model.usda, y up, metres) and its textures (JPEG,
 /// or PNG where one has alpha), each at a multiple of 64 bytes, as the USDZ specification asks.
-/// Meshes are the finest level, materials UsdPreviewSurface. images: may lack textures; their
+/// Meshes are the finest level, materials UsdPreviewSurface; a clip is a UsdSkel animation of 30
+/// poses a second, as long as the longest of them. images: may lack textures; their
 /// materials then have their colour alone. Errors: those of decode_level(); kUnsupported
 /// "usdz.too-large" beyond 4 GB.
 Result<std::vector<std::byte>> encode_usdz(const BundleView& bundle,

@@ -22,9 +22,13 @@ std::vector<RoomModel> models_in_room(const BundleView& bundle, std::uint32_t pa
   room[2] = {0, unit, 0, 0};
   room[3] = {0, 0, 0, 1};
   std::vector<RoomModel> models;
-  for (const SceneRecord& scene : bundle.scenes()) {
+  for (std::uint32_t s = 0; s < bundle.scenes().size(); ++s) {
+    const SceneRecord& scene = bundle.scenes()[s];
     if (scene.pattern != pattern) continue;
-    models.push_back({scene.model, room * glm::dmat4(scene_matrix(scene))});
+    models.push_back({scene.model, room * glm::dmat4(scene_matrix(scene)), kNone});
+    for (const SceneClipRecord& plays : bundle.scene_clips()) {
+      if (plays.scene == s) models.back().clip = plays.clip;
+    }
   }
   return models;
 }

@@ -1,12 +1,14 @@
 """Clips of glTF files from the command line: which one plays, in a single bake and in a project, and files that contradict themselves."""
 import copy
 import json
+import math
 import re
 import subprocess
 import sys
 import unittest
 
-from programs import COVER, QUICK, ROOT, ProgramTest
+from programs import COVER, QUICK, ROOT, ProgramTest, picture
+from usd_skel import Skeleton
 
 MOVING = ROOT / "tests/import/clips/moving.gltf"
 
@@ -29,8 +31,7 @@ class Clips(ProgramTest):
         return self.scene_clips(self.folder / "m.modar")
 
     def scene_clips(self, bundle):
-        """By the second reader."""
-        read = json.loads(subprocess.run([sys.executable, ROOT / "scripts/read_bundle.py", "--json", bundle], capture_output=True, text=True, check=True).stdout)
+        read = self.read(bundle)
         return [(read["clips"][each["clip"]]["name"], each["flags"]) for each in read.get("scene_clips", [])]
 
     def test_the_first_loops_unless_a_scene_says_otherwise(self):
@@ -84,9 +85,28 @@ class Clips(ProgramTest):
         first, again = (self.clips(self.folder / name) for name in ("m.modar", "again.modar"))
         self.assertEqual([clip[:2] for clip in first], [clip[:2] for clip in again])
 
+    def test_usdz_moves_as_three_has_it(self):
+        """Nodes that shear what they move, morph targets, a skin of 40 joints: at 20 times, by a reader of UsdSkel that is not the writer's."""
+        picture(self.folder / "p.png")
+        for name, most in (("morphs", 1.5e-3), ("skinned", 5e-4)):
+            self.assertEqual(self.modar("bake", MOVING.parent / f"{name}.gltf", "p.png", "-o", "m.modar", *QUICK).returncode, 0)
+            self.assertEqual(self.modar("inspect", "m.modar", "--extract", name).returncode, 0)
+            skeleton = Skeleton(self.folder / name / "p.usdz")
+            [model], [clip, *_] = (self.read("m.modar")[key] for key in ("models", "clips"))
+            lines = (MOVING.parent / f"{name}.txt").read_text().splitlines()
+            count = len(lines) // 20
+            for step in range(20):
+                points = [[c + model["scale"] * x for c, x in zip(model["center"], point)] for point in skeleton.at(clip["seconds"] * (step + 0.37) / 20)]
+                for line in lines[step * count:(step + 1) * count]:
+                    wanted = [float(each) for each in line.split()]
+                    self.assertLess(min(math.dist(wanted, point) for point in points), most * model["diagonal"], (name, step))
+
+    def read(self, bundle):
+        """By the second reader."""
+        return json.loads(subprocess.run([sys.executable, ROOT / "scripts/read_bundle.py", "--json", bundle], cwd=self.folder, capture_output=True, text=True, check=True).stdout)
+
     def clips(self, bundle):
-        read = json.loads(subprocess.run([sys.executable, ROOT / "scripts/read_bundle.py", "--json", bundle], capture_output=True, text=True, check=True).stdout)
-        return [(each["name"], each["seconds"]) for each in read["clips"]]
+        return [(each["name"], each["seconds"]) for each in self.read(bundle)["clips"]]
 
     def test_clips_are_looked_at_beside_their_source_and_shown(self):
         """`check --visual`, the report's stills and the turntable. A source of which one clip moves otherwise is found: its rest is the same."""
