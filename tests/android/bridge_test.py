@@ -13,7 +13,7 @@ from machine import (APP, FAKES, FRAMES, HEIGHT, ROOT, SOAK, WIDTH, ProgramTest,
                      make_covered_clip, make_long_clip, nv21_of, run_java, write_fakes)
 
 from film_project import FILM_FPS, FILM_FRAMES, bake_film, make_frames  # noqa: E402
-from programs import COVERED, READINGS, SEEN, TURNED, TURNS, write_turns  # noqa: E402
+from programs import COVERED, QUICK, READINGS, SEEN, TURNED, TURNS, picture, write_turns  # noqa: E402
 
 BRIDGE = ["Native", "ModarException", "Poses", "Gyroscope", "Media", "VideoCopy", "Frame", "FrameHandover"]
 SENSORS = ["hardware/Sensor", "hardware/SensorEvent", "hardware/SensorEventListener", "hardware/SensorManager", "os/Handler",
@@ -168,6 +168,14 @@ class Bridge(ProgramTest):
                 coloured += 1
         self.assertEqual(told, 6)
         self.assertGreater(coloured, 10)
+
+    def test_clips_play_stop_and_end(self):
+        document = json.loads((ROOT / "tests/import/clips/moving.gltf").read_text())
+        document["animations"] = [{**document["animations"][0], "name": name} for name in ("walk", "wave")]
+        (self.folder / "m.gltf").write_text(json.dumps(document))
+        picture(self.folder / "p.png")
+        self.assertEqual(self.modar("bake", "m.gltf", "p.png", "-o", "m.modar", *QUICK).returncode, 0)
+        self.assertEqual(self.bridge("clips", self.folder / "m.modar").strip(), "played")
 
     def test_texts_are_the_projects(self):
         told = [bytes.fromhex(line).decode("utf-16-be") for line in self.bridge("texts", bake_with_texts(self, "texts.modar")).split()]

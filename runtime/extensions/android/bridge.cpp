@@ -735,6 +735,41 @@ MODAR_NATIVE(jboolean, waiting)(JNIEnv* env, jclass, jlong number) {
   return session && modar_screen_waiting(session->screen) != 0 ? JNI_TRUE : JNI_FALSE;
 }
 
+MODAR_NATIVE(jint, clipModel)(JNIEnv* env, jclass, jlong number, jint clip) {
+  const Use session(env, number, &Session::tracking);
+  auto found = modar::sized<modar_clip>();
+  if (!session || modar_clip_at(session->bundle, static_cast<std::uint32_t>(clip), &found) == 0) {
+    return -1;
+  }
+  return static_cast<jint>(found.model);
+}
+
+MODAR_NATIVE(jstring, clipName)(JNIEnv* env, jclass, jlong number, jint clip) {
+  return name_of(env, number, clip, modar_clip_name);
+}
+
+MODAR_NATIVE(jboolean, playClip)
+(JNIEnv* env, jclass, jlong number, jint scene, jint clip, jboolean loops, jdouble blend_s) {
+  const Use session(env, number, &Session::drawing);
+  if (!session) return JNI_FALSE;
+  const int plays =
+      modar_clip_play(session->screen, static_cast<std::uint32_t>(scene),
+                      static_cast<std::uint32_t>(clip), loops != JNI_FALSE ? 1 : 0, blend_s);
+  return plays != 0 ? JNI_TRUE : JNI_FALSE;
+}
+
+MODAR_NATIVE(void, stopClip)(JNIEnv* env, jclass, jlong number, jint scene) {
+  const Use session(env, number, &Session::drawing);
+  if (session) modar_clip_stop(session->screen, static_cast<std::uint32_t>(scene));
+}
+
+MODAR_NATIVE(jint, clipPlaying)(JNIEnv* env, jclass, jlong number, jint scene) {
+  const Use session(env, number, &Session::drawing);
+  if (!session) return -1;
+  const auto index = static_cast<std::uint32_t>(scene);
+  return static_cast<jint>(modar_clip_playing(session->screen, index)) - 1;
+}
+
 MODAR_NATIVE(void, onDrawFrame)
 (JNIEnv* env, jclass, jlong number, jbyteArray nv21, jobject poses, jboolean again) {
   const Use session(env, number, &Session::drawing);

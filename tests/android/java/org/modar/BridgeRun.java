@@ -57,6 +57,9 @@ public final class BridgeRun {
             case "focal":
                 focal(words[1]);
                 break;
+            case "clips":
+                clips(words[1]);
+                break;
             case "acts":
                 acts(words[1], words[5], Integer.parseInt(words[6]));
                 break;
@@ -325,6 +328,36 @@ public final class BridgeRun {
     }
 
     /** All texts of the first pattern as escaped UTF-16: language, text, alternative. */
+    /** Two clips of two seconds; the scene loops the first. */
+    private static void clips(String bundle) throws Exception {
+        long session = Native.openFile(bundle);
+        StringBuilder names = new StringBuilder();
+        for (int i = 0; Native.clipModel(session, i) >= 0; i++) names.append(Native.clipName(session, i)).append(' ');
+        check(names.toString().equals("walk wave "), "clips: " + names);
+        throwsCode("android.index", () -> Native.clipName(session, 2));
+        check(Native.clipPlaying(session, 0) == -1, "nothing plays before the pattern is found");
+        Poses poses = new Poses(1);
+        poses.show(0);
+        double[] times = {0, 1.9, 2.1};
+        for (double time : times) {
+            Native.act(session, time, poses.bytes);
+            check(Native.clipPlaying(session, 0) == 0, "the scene's clip at " + time);
+        }
+        check(!Native.playClip(session, 0, 2, true, 0.3), "a clip of no model");
+        check(!Native.playClip(session, 1, 0, true, 0.3), "no scene");
+        check(Native.playClip(session, 0, 1, false, 0.3), "the other");
+        Native.act(session, 2.2, poses.bytes);
+        check(Native.clipPlaying(session, 0) == 1, "the other plays: " + Native.clipPlaying(session, 0));
+        Native.act(session, 4.5, poses.bytes);
+        check(Native.clipPlaying(session, 0) == -1, "it has ended");
+        check(Native.playClip(session, 0, 1, true, 0), "again");
+        Native.act(session, 4.6, poses.bytes);
+        Native.stopClip(session, 0);
+        check(Native.clipPlaying(session, 0) == -1, "it was stopped");
+        Native.close(session);
+        System.out.println("played");
+    }
+
     private static void texts(String bundle) throws Exception {
         long session = Native.openFile(bundle);
         check(Native.language(session, -1) == null && Native.patternText(session, 0, false, "xx") == null, "none");
@@ -526,6 +559,10 @@ public final class BridgeRun {
             throwsCode("android.closed", () -> Native.touch(closed, 0, 0, 0, 0));
             throwsCode("android.closed", () -> Native.lookAround(closed, 0, 0, true));
             throwsCode("android.closed", () -> Native.waiting(closed));
+            throwsCode("android.closed", () -> Native.clipModel(closed, 0));
+            throwsCode("android.closed", () -> Native.playClip(closed, 0, 0, true, 0));
+            throwsCode("android.closed", () -> Native.stopClip(closed, 0));
+            throwsCode("android.closed", () -> Native.clipPlaying(closed, 0));
             throwsCode("android.closed", () -> Native.press(closed, 0));
             throwsCode("android.closed", () -> Native.status(closed));
             throwsCode("android.closed", () -> Native.patternCount(closed));

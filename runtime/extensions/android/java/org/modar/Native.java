@@ -164,6 +164,27 @@ public final class Native {
     public static native void onDrawFrame(long session, byte[] nv21, ByteBuffer poses, boolean again)
             throws ModarException;
 
+    /** The model of a clip, by index from 0; -1: no more. */
+    public static native int clipModel(long session, int clip) throws ModarException;
+
+    public static native String clipName(long session, int clip) throws ModarException;
+
+    /**
+     * From the next act() on, a scene's model plays a clip of its own from the beginning.
+     *
+     * @param loops false: its last pose stays
+     * @param blendS seconds in which the present pose turns into it, usually 0.3
+     * @return false: the model has no such clip
+     */
+    public static native boolean playClip(long session, int scene, int clip, boolean loops, double blendS)
+            throws ModarException;
+
+    /** The pose stays. */
+    public static native void stopClip(long session, int scene) throws ModarException;
+
+    /** The clip that moves a scene's model; -1: none does, or it has ended. */
+    public static native int clipPlaying(long session, int scene) throws ModarException;
+
     /** The same with the planes of YUV_420_888, with the strides that the Image states. */
     public static native void onDrawPlanes(long session, ByteBuffer y, int yStride, ByteBuffer u, ByteBuffer v,
             int uvStride, int uvPixelStride, ByteBuffer poses, boolean again) throws ModarException;
