@@ -377,7 +377,7 @@ struct Depths {
 
 /// Depth in front of the eye is -z; over a box it spans its centre's, plus or minus its reach.
 void add_box(const glm::dmat4& to_eye, const float (&least)[3], const float (&most)[3],
-             Depths& depths, double room = 1.0) {
+             Depths& depths) {
   double centre = -to_eye[3][2];
   double reach = 0.0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -386,8 +386,8 @@ void add_box(const glm::dmat4& to_eye, const float (&least)[3], const float (&mo
     centre -= to_eye[axis][2] * 0.5 * (low + high);
     reach += std::abs(to_eye[axis][2]) * 0.5 * (high - low);
   }
-  depths.nearest = std::min(depths.nearest, centre - room * reach);
-  depths.farthest = std::max(depths.farthest, centre + room * reach);
+  depths.nearest = std::min(depths.nearest, centre - reach);
+  depths.farthest = std::max(depths.farthest, centre + reach);
 }
 
 }  // namespace
@@ -407,16 +407,23 @@ DepthRange depth_range(const BundleView& bundle, std::span<const DrawItem> items
   constexpr double kGreatestRatio = 1000.0;
   constexpr double kMargin =
       0.01;  // keeps what touches a plane inside it, though half floats move it by 0.0002
-  constexpr double kBlendRoom = 1.5;  // of boxes, which a pose between two clips may leave
   Depths depths;
   for (const DrawItem& item : items) {
     const glm::dmat4 to_eye(item.to_eye);
     if (is_picture(bundle, item.node)) add_box(to_eye, {-1, -1, 0}, {1, 1, 0}, depths);
     if (item.model >= bundle.models().size()) continue;
-    const double room = item.bones == nullptr ? 1.0 : kBlendRoom;
-    visit_boxes(bundle, bundle.models()[item.model], [&](const auto& least, const auto& most) {
-      add_box(to_eye, least, most, depths, room);
-    });
+    const std::uint32_t first_bone = bones_of(bundle, item.model).first;
+    const ChunkGroup group = bundle.chunk_group(item.model);
+    for (std::uint32_t c = group.first_chunk; c < group.first_chunk + group.chunk_count; ++c) {
+      const ChunkRecord& rest = bundle.chunks()[c];
+      const std::uint32_t part = item.bones == nullptr ? kNone : part_of(bundle, rest.material);
+      ChunkRecord box = rest;
+      if (part != kNone) {
+        const PartRecord& moving = bundle.moving_parts()[part];
+        box = boxed(rest, moving, item.bones + (moving.first_bone - first_bone));
+      }
+      add_box(to_eye, box.bounds_min, box.bounds_max, depths);
+    }
   }
   if (!(depths.farthest > 0.0) || !std::isfinite(depths.farthest)) return {};
   DepthRange range;

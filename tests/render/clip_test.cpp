@@ -347,6 +347,12 @@ TEST_F(MovingPictureTest, BoxesHoldPosesOfNoClip) {
     item.bones = player.bones().data();
     EXPECT_LE(different(draw(*renderer, camera_above(256), {&item, 1}), expected), 400);
   }
+  const DrawItem posed{0, before_eye()};
+  const DepthRange wanted = depth_range(*still.view, {&posed, 1});
+  item.to_eye = before_eye();
+  const DepthRange range = depth_range(*moving.view, {&item, 1});
+  EXPECT_LE(range.near_plane, wanted.near_plane + 1e-4);
+  EXPECT_GE(range.far_plane, wanted.far_plane - 1e-4);
 }
 
 /// A ray hits the moving model where it hits the moved one.
