@@ -7,7 +7,7 @@ import subprocess
 import sys
 import unittest
 
-from programs import COVER, QUICK, ROOT, ProgramTest, picture
+from programs import QUICK, ROOT, ProgramTest, picture
 from usd_skel import Skeleton
 
 MOVING = ROOT / "tests/import/clips/moving.gltf"
@@ -19,13 +19,14 @@ class Clips(ProgramTest):
         self.document = json.loads(MOVING.read_text())
         self.document["animations"] = [{**self.document["animations"][0], "name": name} for name in ("walk", "wave")]
         self.write(self.document)
+        picture(self.folder / "cover.png")
 
     def write(self, document):
         (self.folder / "m.gltf").write_text(json.dumps(document))
 
     def played(self, *words):
         """The names of clips that scenes play, and whether they loop."""
-        done = self.modar("bake", "m.gltf", COVER, "-o", "m.modar", *QUICK, *words)
+        done = self.modar("bake", "m.gltf", "cover.png", "-o", "m.modar", *QUICK, *words)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(self.modar("check", "m.modar").returncode, 0)
         return self.scene_clips(self.folder / "m.modar")
@@ -39,7 +40,7 @@ class Clips(ProgramTest):
                               (("--scene", "cover=m,clip=wave,once"), [("wave", 0)]), (("--scene", "cover=m,clip=none"), [])):
             with self.subTest(words):
                 self.assertEqual(self.played(*words), wanted)
-        done = self.modar("bake", "m.gltf", COVER, "-o", "n.modar", *QUICK, "--scene", "cover=m,clip=wale")
+        done = self.modar("bake", "m.gltf", "cover.png", "-o", "n.modar", *QUICK, "--scene", "cover=m,clip=wale")
         self.assertEqual(done.returncode, 1, done.stderr)
         self.assertIn("'walk'", done.stderr)
         self.assertFalse((self.folder / "n.modar").exists())
@@ -55,7 +56,7 @@ class Clips(ProgramTest):
         project = self.folder / "museum"
         project.mkdir()
         (project / "m.gltf").write_bytes((self.folder / "m.gltf").read_bytes())
-        (project / "cover.png").write_bytes(COVER.read_bytes())
+        picture(project / "cover.png")
         text = ('[bake]\nloop-views = 8\nscore = false\nparameters = "none"\n[[model]]\nfile = "m.gltf"\n[[pattern]]\nfile = "cover.png"\n'
                 '[[scene]]\npattern = "cover"\nmodel = "m"\nname = "pot"\nclip = "wave"\nonce = true\n')
         for action, code in (('on = "tap pot"\ndo = "play walk on pot"', 0), ('on = "tap pot"\ndo = "stop pot"', 0), ('on = "tap pot"\ndo = "play dance on pot"', 1)):
@@ -87,11 +88,10 @@ class Clips(ProgramTest):
 
     def test_usdz_moves_as_three_has_it(self):
         """Nodes that shear what they move, morph targets, a skin of 40 joints: at 20 times, by a reader of UsdSkel that is not the writer's."""
-        picture(self.folder / "p.png")
         for name, most in (("morphs", 1.5e-3), ("skinned", 5e-4)):
-            self.assertEqual(self.modar("bake", MOVING.parent / f"{name}.gltf", "p.png", "-o", "m.modar", *QUICK).returncode, 0)
+            self.assertEqual(self.modar("bake", MOVING.parent / f"{name}.gltf", "cover.png", "-o", "m.modar", *QUICK).returncode, 0)
             self.assertEqual(self.modar("inspect", "m.modar", "--extract", name).returncode, 0)
-            skeleton = Skeleton(self.folder / name / "p.usdz")
+            skeleton = Skeleton(self.folder / name / "cover.usdz")
             [model], [clip, *_] = (self.read("m.modar")[key] for key in ("models", "clips"))
             lines = (MOVING.parent / f"{name}.txt").read_text().splitlines()
             count = len(lines) // 20
@@ -135,7 +135,7 @@ class Clips(ProgramTest):
         self.assertEqual((len(set(pictures)), pictures[:3]), (3, pictures[3:]))
 
     def test_repair_says_that_it_leaves_them_out(self):
-        done = self.modar("bake", "m.gltf", COVER, "-o", "m.modar", "--repair", *QUICK)
+        done = self.modar("bake", "m.gltf", "cover.png", "-o", "m.modar", "--repair", *QUICK)
         self.assertIn("leaves out 2 clips", done.stderr)
 
     def test_keys_at_time_0_alone_are_a_pose(self):
