@@ -930,6 +930,8 @@ class Page(ProgramTest):
             shutil.copy(self.bundle, each)
         done = self.modar("web", *bundles, "-o", self.folder / "two", "--languages", "en", "--quiet")
         self.assertEqual(done.returncode, 0, done.stderr)
+        done = self.modar("web", *bundles, "-o", self.folder / "three", "--baker", "--quiet")
+        self.assertEqual((done.returncode, done.stderr.endswith("npx modar web --baker [web.page]\n")), (5, True), done.stderr)
         server = Server(self.folder / "two")
         self.addCleanup(server.close)
         state = "document.getElementById('viewer').state === '%s'"
