@@ -178,6 +178,32 @@ TEST(Rectify, TheSpreadOfTheAspectIsHonest) {
   EXPECT_GT(within, kViews * 95 / 100);
 }
 
+TEST(Rectify, ACroppedPhotoSaysHowLittleItTellsOfTheShape) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> any(-1, 1);
+  constexpr int kViews = 200;
+  int within = 0;
+  int doubted = 0;
+  for (int i = 0; i < kViews; ++i) {
+    const double aspect = std::exp(0.4 * any(random));
+    auto corners = photographed(aspect, 0.5 * any(random), 0.5 * any(random), 790);
+    PixelPoint low = corners[0];
+    PixelPoint high = corners[0];
+    for (const PixelPoint& corner : corners) {
+      low = {std::min(low.x, corner.x), std::min(low.y, corner.y)};
+      high = {std::max(high.x, corner.x), std::max(high.y, corner.y)};
+    }
+    for (PixelPoint& corner : corners) corner = {corner.x - low.x + 60, corner.y - low.y + 60};
+    const auto width = static_cast<std::uint32_t>(high.x - low.x) + 120;
+    const auto height = static_cast<std::uint32_t>(high.y - low.y) + 120;
+    const AspectEstimate found = estimate_aspect(corners, width, height, 0);
+    within += std::fabs(std::log(found.aspect / aspect)) < 2 * found.spread / found.aspect ? 1 : 0;
+    doubted += found.spread > 0.1 * found.aspect ? 1 : 0;
+  }
+  EXPECT_GT(within, kViews * 93 / 100);
+  EXPECT_GT(doubted, kViews * 80 / 100);
+}
+
 TEST(Rectify, TheFocalLengthOfThePhotoDecidesWhereItIsKnown) {
   const auto corners = photographed(1.0, 0.1, -0.6, 2000);
   const AspectEstimate usual = estimate_aspect(corners, 1000, 750, 0);

@@ -143,6 +143,23 @@ std::optional<Result<SourceModel>> small_model(const std::string& path, const st
   return read_model(path, {1, true, within});
 }
 
+/// Uncertainty of width by height from which models would be placed visibly wrong.
+constexpr double kUnsureShape = 0.1;
+
+void doubt_shape(const Photo& photo, const std::array<PixelPoint, 4>& corners,
+                 const std::string& path, std::vector<Diagnostic>& said) {
+  const AspectEstimate sides =
+      estimate_aspect(corners, photo.image.width, photo.image.height, photo.focal_px);
+  if (sides.spread < kUnsureShape * sides.aspect) return;
+  char cause[96];
+  std::snprintf(cause, sizeof cause,
+                "a cropped photo does not tell the picture's shape: width by height %.2f +- %.2f",
+                sides.aspect, sides.spread);
+  said.push_back({"pattern.shape", DiagnosticSeverity::kWarning, path, 0, cause,
+                  "give the whole photo; or measure it: `modar pattern rectify " + path +
+                      " --width 210mm --height 297mm -o picture.png`"});
+}
+
 Result<void> find_picture(PatternRequest& pattern, std::vector<Diagnostic>& said) {
   if (!pattern.shape.text.empty() || !is_picture_file(pattern.path)) return {};
   MODAR_ASSIGN(const Photo photo, read_photo(pattern.path));
@@ -169,6 +186,7 @@ Result<void> find_picture(PatternRequest& pattern, std::vector<Diagnostic>& said
       found.corners ? "a photo: the picture in it has the corners " + pattern.shape.text.substr(13)
                     : std::string("the whole file is taken as the picture");
   const bool sure = *found.doubt == 0;
+  if (found.corners) doubt_shape(photo, *found.corners, pattern.path, said);
   said.push_back(
       {sure ? "pattern.photo" : "pattern.doubtful",
        sure ? DiagnosticSeverity::kInfo : DiagnosticSeverity::kWarning, pattern.path, 0,
