@@ -1,109 +1,57 @@
-#include "bake/commands/ship_command.hpp"
-
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <termios.h>
-#include <unistd.h>
-
-#include <cerrno>
+// `modar ship`: releases, and the cost of an update.
+#include <algorithm>
 #include <cstdio>
-#include <cstring>
 #include <ctime>
-#include <fstream>
-#include <iterator>
+#include <memory>
+#include <thread>
 
-#include "bake/commands/ship_json.hpp"
-#include "bake/io/input.hpp"
-#include "bake/io/output.hpp"
+#include "bake/commands/ship_keys.hpp"
 #include "bake/io/terminal.hpp"
+#include "bake/json.hpp"
 #include "bake/ship/http/http_reader.hpp"
-#include "bake/ship/keys/keys.hpp"
-#include "bake/ship/keys/root_draft.hpp"
+#include "bake/ship/publish.hpp"
 #include "bake/ship/release_folder.hpp"
-#include "formats/base/atomic_file.hpp"
+#include "bake/ship/verify_release.hpp"
 #include "modar/device_profile.hpp"
-#include "modar/release.hpp"
 
 namespace modar {
 namespace {
 
+struct ShipPublishCommand {
+  PublishRequest request;
+  KeyFiles key;
+  std::string expires;  ///< a time, or empty
+  unsigned valid_days = 365;
+  bool no_expiry = false;
+  int fresh_days = -1;               ///< -1: as the newest release has it
+  std::vector<std::string> devices;  ///< NAME=PROFILE[,PROFILE]
+  bool quiet = false;
+  bool json = false;
+};
+
 constexpr std::int64_t kDay = 86400;
 
-Result<std::string> read_text(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    return fail(ExitCode::kIo, "io.open", path, std::strerror(errno), "check the path");
-  }
-  return std::string(std::istreambuf_iterator<char>(file), {});
-}
+/// Of PieceForm, whose first is 1.
+constexpr const char* kFormNames[] = {"stored",       "zstd",  "zstd-etc1",      "mesh",
+                                      "derived-text", "level", "tracker-record", "coded"};
 
-/// A file of public keys, as `parse` reads its text.
-template <class Keys>
-Result<Keys> read_public(const std::string& path, Result<Keys> (*parse)(std::string_view)) {
-  MODAR_ASSIGN(const auto text, read_text(path));
-  auto keys = parse(text);
-  return keys ? std::move(keys) : in_file(path, keys.error());
-}
-
-std::string first_line(const std::string& text) {
-  const std::string line = text.substr(0, text.find('\n'));
-  return line.ends_with('\r') ? line.substr(0, line.size() - 1) : line;
-}
-
-/// Asks on the terminal, without an echo.
-Result<std::string> ask_pass_phrase() {
-  if (::isatty(STDIN_FILENO) == 0) {
-    return fail(ExitCode::kUsage, "key.pass-phrase", "", "the secret key is encrypted",
-                "give its pass phrase with --pass-phrase-file");
+/// The --json documents' keys are a contract (json.md).
+std::string publish_json(const PublishReport& report) {
+  Json forms = Json::array();
+  for (const auto& [form, totals] : report.forms) {
+    forms.push_back({{"form", kFormNames[static_cast<std::size_t>(form) - 1]},
+                     {"pieces", totals.pieces},
+                     {"raw_bytes", totals.raw_bytes},
+                     {"stored_bytes", totals.stored_bytes}});
   }
-  std::fputs("Pass phrase: ", stderr);
-  termios shown{};
-  ::tcgetattr(STDIN_FILENO, &shown);
-  termios hidden = shown;
-  hidden.c_lflag &= ~static_cast<tcflag_t>(ECHO);
-  ::tcsetattr(STDIN_FILENO, TCSAFLUSH, &hidden);
-  std::string line;
-  for (int c = std::getchar(); c != EOF && c != '\n'; c = std::getchar()) {
-    line += static_cast<char>(c);
-  }
-  ::tcsetattr(STDIN_FILENO, TCSAFLUSH, &shown);
-  std::fputc('\n', stderr);
-  return line;
-}
-
-Result<SecretKey> load_key(const std::string& path, const std::string& pass_phrase_file) {
-  MODAR_ASSIGN(const auto text, read_text(path));
-  std::string pass_phrase;
-  if (!pass_phrase_file.empty()) {
-    MODAR_ASSIGN(const auto file, read_text(pass_phrase_file));
-    pass_phrase = first_line(file);
-  } else if (needs_pass_phrase(text)) {
-    const auto asked = ask_pass_phrase();
-    if (!asked) return asked.map([](const std::string&) { return SecretKey(); });
-    pass_phrase = *asked;
-  }
-  auto key = parse_secret_key(text, pass_phrase);
-  if (!key) {
-    key.error().where = path;
-  } else {
-    warn_of_readers(path);
-  }
-  return key;
-}
-
-/// A file that only its owner may read. Errors: kIo.
-Result<void> write_secret(const std::string& path, const std::string& text) {
-  const mode_t mask = ::umask(0077);
-  auto written = write_file(path, std::string_view(text));
-  ::umask(mask);
-  if (written && ::chmod(path.c_str(), S_IRUSR | S_IWUSR) != 0) {
-    // FAT and the like have no modes: who may mount the disk may read the key.
-    if (errno != ENOSYS && errno != EPERM && errno != EOPNOTSUPP) {
-      return fail(ExitCode::kIo, "io.write", path, std::strerror(errno), "check its owner");
-    }
-    warn_of_readers(path);
-  }
-  return written;
+  const Json changes = Json::list(report.changes, [&](const BundleChange& change) -> Json {
+    return {{"change", to_string(change.kind)}, {"name", change.name}};
+  });
+  const Json json = {{"release", Json::parse(release_text(report.release))},
+                     {"added_bytes", report.added_bytes},
+                     {"changes", changes},
+                     {"forms", forms}};
+  return json.dump();
 }
 
 /// "NAME=ace2,mali400" into the request. Errors: kUsage "ship.for".
@@ -137,154 +85,18 @@ std::string expiry_text(std::int64_t expires) {
   return (expires <= std::time(nullptr) ? "expired " : "valid until ") + time_text(expires);
 }
 
-/// What `ship rotate` and `ship root` work on.
-struct KeyChange {
-  SecretKey key;   ///< signs the change
-  PublicKey next;  ///< signs releases from now on
-  ReleaseFolder folder;
-};
-
-Result<KeyChange> open_key_change(const RotateCommand& command) {
-  MODAR_ASSIGN(auto key, load_key(command.key_file, command.pass_phrase_file));
-  MODAR_ASSIGN(const auto next, read_public(command.next_key, parse_public_key));
-  MODAR_ASSIGN(auto folder, ReleaseFolder::open(command.folder));
-  return KeyChange{std::move(key), next, std::move(folder)};
-}
-
-}  // namespace
-
-namespace {
-
-Result<RootSet> read_root_keys(const std::vector<std::string>& files, unsigned threshold) {
-  std::vector<PublicKey> keys;
-  for (const std::string& file : files) {
-    MODAR_ASSIGN(const auto key, read_public(file, parse_public_key));
-    keys.push_back(key);
-  }
-  return make_root_set(std::move(keys), threshold);
-}
-
-/// Writes the document to sign, and the first signature.
-Result<std::string> write_draft(const RootCommand& command) {
-  MODAR_ASSIGN(const auto key, load_key(command.key_file, command.pass_phrase_file));
-  MODAR_ASSIGN(const auto folder, ReleaseFolder::open(command.folder));
-  RootDraft draft;
-  if (!command.roots.empty()) {
-    MODAR_ASSIGN(const auto roots, read_root_keys(command.roots, command.threshold));
-    draft = draft_root_rotation(folder, roots);
-  } else {
-    MODAR_ASSIGN(const auto next, read_public(command.next_key, parse_public_key));
-    MODAR_ASSIGN(draft, draft_root_metadata(folder, next));
-  }
-  MODAR_TRY(write_root_draft(command.draft, draft));
-  MODAR_ASSIGN(const auto signature, sign_root_draft(command.draft, key));
-  std::fprintf(stderr, "%s\n", draft.meaning.c_str());
-  return signature;
-}
-
-int run_draft(const RootCommand& command) {
-  const auto signature = write_draft(command);
-  if (!signature) return print_error(signature.error());
-  std::printf("%s\n%s\n", command.draft.c_str(), signature->c_str());
-  return static_cast<int>(ExitCode::kOk);
-}
-
-/// Says that the newest release is of an earlier epoch than the root metadata, which devices
-/// refuse. Answers the exit code.
-int note_stale_release(const ReleaseFolder& folder) {
-  const auto word = folder.root_metadata();
-  if (!word) return print_error(word.error());
-  const auto newest = folder.newest();
-  if (!newest) return print_error(newest.error());
-  if (*newest && (*newest)->epoch < word->epoch) {
-    std::fprintf(stderr,
-                 "release %llu is of an earlier epoch, so devices refuse it: publish its bundles "
-                 "again with the key that signs now\n",
-                 static_cast<unsigned long long>((*newest)->version));
-  }
-  return static_cast<int>(ExitCode::kOk);
-}
-
-}  // namespace
-
-int run_trust(const TrustCommand& command) {
-  const auto roots = read_root_keys(command.keys, command.threshold);
-  if (!roots) return print_error(roots.error());
-  if (auto kept = keep_inputs(command.out, command.keys); !kept) return print_error(kept.error());
-  const std::string text = "untrusted comment: root keys of modar, " +
-                           std::to_string(roots->threshold) + " of " +
-                           std::to_string(roots->keys.size()) + "\n" + root_set_line(*roots) + "\n";
-  auto written = write_file(command.out, std::string_view(text));
-  if (!written) return print_error(written.error());
-  std::printf("%s\n", command.out.c_str());
-  return static_cast<int>(ExitCode::kOk);
-}
-
-int run_sign(const SignCommand& command) {
-  const auto key = load_key(command.key_file, command.pass_phrase_file);
-  if (!key) return print_error(key.error());
-  const auto draft = read_root_draft(command.draft);
-  if (!draft) return print_error(draft.error());
-  const auto signature = sign_root_draft(command.draft, *key);
-  if (!signature) return print_error(signature.error());
-  std::fprintf(stderr, "%s\n", draft->meaning.c_str());
-  std::printf("%s\n", signature->c_str());
-  return static_cast<int>(ExitCode::kOk);
-}
-
-int run_accept(const AcceptCommand& command) {
-  const auto trust = read_public(command.trust, parse_root_set);
-  if (!trust) return print_error(trust.error());
-  const auto folder = ReleaseFolder::open(command.folder);
-  if (!folder) return print_error(folder.error());
-  const auto draft = accept_root_draft(*folder, command.draft, *trust);
-  if (!draft) return print_error(draft.error());
-  std::fprintf(stderr, "%s: %s\n", draft->path.c_str(), draft->meaning.c_str());
-  return note_stale_release(*folder);
-}
-
-int run_keygen(const KeygenCommand& command) {
-  const std::string public_file = command.out + ".pub";
-  if (!command.force &&
-      (::access(command.out.c_str(), F_OK) == 0 || ::access(public_file.c_str(), F_OK) == 0)) {
-    return print_error({ExitCode::kUsage, "key.exists", command.out, "the key already exists",
-                        "choose another name, or overwrite it with --force"});
-  }
-  std::string pass_phrase;
-  if (!command.pass_phrase_file.empty()) {
-    for (const std::string& file : {command.out, public_file}) {
-      const auto kept = keep_inputs(file, {command.pass_phrase_file});
-      if (!kept) return print_error(kept.error());
-    }
-    const auto text = read_text(command.pass_phrase_file);
-    if (!text) return print_error(text.error());
-    pass_phrase = first_line(*text);
-  }
-  const auto key = make_key();
-  if (!key) return print_error(key.error());
-  const auto text = secret_key_text(*key, pass_phrase);
-  if (!text) return print_error(text.error());
-  auto written = write_secret(command.out, *text).and_then([&] {
-    return write_file(public_file, std::string_view(public_key_text(key->public_key)));
-  });
-  if (!written) return print_error(written.error());
-  std::printf("%s\n%s\n", command.out.c_str(), public_file.c_str());
-  return static_cast<int>(ExitCode::kOk);
-}
-
-int run_publish(ShipPublishCommand& command) {
-  const auto key = load_key(command.key_file, command.pass_phrase_file);
-  if (!key) return print_error(key.error());
+Result<ExitCode> run_publish(ShipPublishCommand& command) {
+  MODAR_ASSIGN(const auto key, load_key(command.key));
   for (const std::string& text : command.devices) {
-    if (auto taken = take_devices(text, command.request); !taken) return print_error(taken.error());
+    MODAR_TRY(take_devices(text, command.request));
   }
   command.request.expires =
       command.no_expiry ? kNever : std::time(nullptr) + kDay * command.valid_days;
   if (!command.expires.empty()) {
     const auto time = parse_time(command.expires);
     if (!time) {
-      return print_error({ExitCode::kUsage, "ship.expires", "--expires " + command.expires,
-                          time.error().cause, "write it as 2027-01-31T00:00:00Z"});
+      return fail(ExitCode::kUsage, "ship.expires", "--expires " + command.expires,
+                  time.error().cause, "write it as 2027-01-31T00:00:00Z");
     }
     command.request.expires = *time;
   }
@@ -294,179 +106,334 @@ int run_publish(ShipPublishCommand& command) {
   ProgressBar bar(command.quiet || command.json);
   Report stages;
   stages.progress = [&](const std::string& stage, double done) { bar.show(stage, done); };
-  const auto report = publish(command.request, *key, stages);
+  auto published = publish(command.request, key, stages);
   bar.clear();
-  if (!report) return print_error(report.error());
+  MODAR_ASSIGN(const PublishReport report, std::move(published));
   if (command.json) {
-    std::fputs(publish_json(*report).c_str(), stdout);
+    std::fputs(publish_json(report).c_str(), stdout);
   } else if (!command.quiet) {
     std::fprintf(stderr, "release %llu%s: %s added to %s\n",
-                 static_cast<unsigned long long>(report->release.version),
+                 static_cast<unsigned long long>(report.release.version),
                  command.request.dry_run ? " (dry run: nothing is written)" : "",
-                 human_bytes(report->added_bytes).c_str(), command.request.folder.c_str());
-    std::fprintf(stderr, "  %s\n", expiry_text(report->release.expires).c_str());
-    for (const BundleChange& change : report->changes) {
+                 human_bytes(report.added_bytes).c_str(), command.request.folder.c_str());
+    std::fprintf(stderr, "  %s\n", expiry_text(report.release.expires).c_str());
+    for (const BundleChange& change : report.changes) {
       std::fprintf(stderr, "  %-8s%s\n", to_string(change.kind), change.name.c_str());
     }
-    for (const ReleaseBundle& bundle : report->release.bundles) {
+    for (const ReleaseBundle& bundle : report.release.bundles) {
       std::fprintf(stderr, "  %s: %s installed, %s to download in %u pieces\n", bundle.name.c_str(),
                    human_bytes(bundle.size).c_str(), human_bytes(bundle.download_size).c_str(),
                    bundle.pieces);
     }
   }
-  return static_cast<int>(ExitCode::kOk);
+  return ExitCode::kOk;
 }
 
-int run_rotate(const RotateCommand& command) {
-  const auto change = open_key_change(command);
-  if (!change) return print_error(change.error());
-  const auto& [key, next, folder] = *change;
-  if (auto fine = folder.check_signer(key.public_key); !fine) return print_error(fine.error());
-  if (auto added = folder.add_key(next, key); !added) return print_error(added.error());
-  std::fprintf(stderr, "link %u of the chain: devices move to key %s\n", folder.key_rotations(),
-               to_hex(next.id).c_str());
-  return static_cast<int>(ExitCode::kOk);
+void add_publish(CommandLine& ship) {
+  CommandLine& line = ship.command("publish", "Publish bundles as a signed release");
+  const auto publish = std::make_shared<ShipPublishCommand>();
+  PublishRequest& request = publish->request;
+  request.recipe.jobs = std::max(1u, std::thread::hardware_concurrency());
+  line.option("bundles", &request.bundles,
+              "New or changed bundles; other bundles stay in the release", {.type = "BUNDLE..."});
+  add_folder(line, request.folder);
+  add_key_options(line, publish->key);
+  line.flag("--dry-run", request.dry_run, "Show what would change, and write nothing");
+  line.option("--drop", &request.drop, "Remove this bundle from the release; repeatable",
+              {.type = "NAME", .repeatable = true});
+  line.group("Validity, numbers and devices", Shown::kInFull);
+  line.option("--expires", &publish->expires,
+              "Time when the release expires, as 2027-01-31T00:00:00Z", {.type = "TIME"});
+  line.option("--valid-days", &publish->valid_days, "Days until the release expires",
+              {.shows_default = true, .least = 1, .most = 36500, .excludes = "--expires"});
+  line.flag("--no-expiry", publish->no_expiry, "The release never expires: for USB sticks",
+            {.excludes = "--expires"});
+  line.option(
+      "--fresh-days", &publish->fresh_days,
+      "Days that a release stays valid after each `modar ship refresh`; 0: no such limit. Kept "
+      "for later releases",
+      {.type = "N", .least = 0, .most = 36500});
+  line.option("--release", &request.version,
+              "Release number, greater than all before (default: the newest plus one)",
+              {.type = "N"});
+  line.option("--for", &publish->devices, "Limit a bundle to these device profiles",
+              {.type = "NAME=PROFILE[,PROFILE]"});
+  line.option("--jobs", &request.recipe.jobs, "Processes; the output does not depend on it",
+              {.shows_default = true, .least = 1, .most = 256});
+  line.flag("--quiet", publish->quiet, "No progress or summary");
+  line.flag("--json", publish->json, "Print the release and the written files as JSON");
+  line.footer(ship_example("  modar ship publish vase.modar --to /var/www/ar --key museum.key\n"));
+  line.run([publish] { return run_publish(*publish); });
 }
 
-int run_root(const RootCommand& command) {
-  if (!command.draft.empty()) return run_draft(command);
-  const auto change = open_key_change(command);
-  if (!change) return print_error(change.error());
-  const auto& [key, next, folder] = *change;
-  const auto word = folder.add_root_metadata(next, key);
-  if (!word) return print_error(word.error());
-  std::fprintf(stderr, "epoch %llu: key %s signs; publish the next release with it\n",
-               static_cast<unsigned long long>(word->epoch), to_hex(next.id).c_str());
-  return note_stale_release(folder);
-}
+struct RefreshCommand {
+  std::string folder;
+  KeyFiles key;
+};
 
-int run_refresh(const RefreshCommand& command) {
-  const auto key = load_key(command.key_file, command.pass_phrase_file);
-  if (!key) return print_error(key.error());
-  const auto folder = ReleaseFolder::open(command.folder);
-  if (!folder) return print_error(folder.error());
-  if (auto fine = folder->check_signer(key->public_key); !fine) return print_error(fine.error());
-  const auto newest = folder->newest();
-  if (!newest) return print_error(newest.error());
-  if (!*newest || (*newest)->fresh_days == 0) {
-    return print_error({ExitCode::kUsage, "ship.fresh", command.folder,
-                        "its newest release has no --fresh-days",
-                        "publish with --fresh-days 7 first"});
+Result<ExitCode> run_refresh(const RefreshCommand& command) {
+  MODAR_ASSIGN(const auto key, load_key(command.key));
+  MODAR_ASSIGN(const auto folder, ReleaseFolder::open(command.folder));
+  MODAR_TRY(folder.check_signer(key.public_key));
+  MODAR_ASSIGN(const auto newest, folder.newest());
+  if (!newest || newest->fresh_days == 0) {
+    return fail(ExitCode::kUsage, "ship.fresh", command.folder,
+                "its newest release has no --fresh-days", "publish with --fresh-days 7 first");
   }
-  if (auto signed_ = folder->add_freshness(**newest, std::time(nullptr), *key); !signed_) {
-    return print_error(signed_.error());
-  }
+  MODAR_TRY(folder.add_freshness(*newest, std::time(nullptr), key));
   std::fprintf(stderr, "release %llu confirmed as the newest for %llu days\n",
-               static_cast<unsigned long long>((*newest)->version),
-               static_cast<unsigned long long>((*newest)->fresh_days));
-  return static_cast<int>(ExitCode::kOk);
+               static_cast<unsigned long long>(newest->version),
+               static_cast<unsigned long long>(newest->fresh_days));
+  return ExitCode::kOk;
 }
 
-int run_list(const ListCommand& command) {
-  const auto folder = ReleaseFolder::open(command.folder);
-  if (!folder) return print_error(folder.error());
-  const auto newest = folder->newest();
-  if (!newest) return print_error(newest.error());
-  std::vector<ListedRelease> releases;
-  for (const std::uint64_t version : folder->versions()) {
-    auto release = folder->release(version);
-    if (!release) return print_error(release.error());
-    const bool current = *newest && (*newest)->version == version;
-    releases.push_back({std::move(*release), folder->published(version), current});
-  }
-  if (command.json) {
-    std::fputs(list_json(releases).c_str(), stdout);
-    return static_cast<int>(ExitCode::kOk);
-  }
-  for (const ListedRelease& listed : releases) {
-    std::printf("%s release %llu, published %s, %s\n", listed.current ? "*" : " ",
-                static_cast<unsigned long long>(listed.release.version),
-                time_text(listed.published).c_str(), expiry_text(listed.release.expires).c_str());
-    for (const ReleaseBundle& bundle : listed.release.bundles) {
+void add_refresh(CommandLine& ship) {
+  CommandLine& line =
+      ship.command("refresh", "Confirm that the newest release is still current (daily, by cron)");
+  const auto refresh = std::make_shared<RefreshCommand>();
+  add_folder(line, refresh->folder);
+  add_key_options(line, refresh->key);
+  line.footer(ship_example("  modar ship refresh --to /var/www/ar --key museum.key\n"));
+  line.run([refresh] { return run_refresh(*refresh); });
+}
+
+struct ListCommand {
+  std::string folder;
+  bool json = false;
+};
+
+Result<ExitCode> run_list(const ListCommand& command) {
+  MODAR_ASSIGN(const auto folder, ReleaseFolder::open(command.folder));
+  MODAR_ASSIGN(const auto newest, folder.newest());
+  Json list = Json::array();
+  for (const std::uint64_t version : folder.versions()) {
+    MODAR_ASSIGN(const Release release, folder.release(version));
+    const std::string published = time_text(folder.published(version));
+    const bool current = newest && newest->version == version;
+    if (command.json) {
+      list.push_back({{"release", Json::parse(release_text(release))},
+                      {"published", published},
+                      {"current", current}});
+      continue;
+    }
+    std::printf("%s release %llu, published %s, %s\n", current ? "*" : " ",
+                static_cast<unsigned long long>(version), published.c_str(),
+                expiry_text(release.expires).c_str());
+    for (const ReleaseBundle& bundle : release.bundles) {
       std::printf("    %s: %s installed, %s to download\n", bundle.name.c_str(),
                   human_bytes(bundle.size).c_str(), human_bytes(bundle.download_size).c_str());
     }
   }
-  return static_cast<int>(ExitCode::kOk);
+  if (command.json) std::fputs(Json({{"releases", list}}).dump().c_str(), stdout);
+  return ExitCode::kOk;
 }
 
-int run_prune(const PruneCommand& command) {
-  const auto folder = ReleaseFolder::open(command.folder);
-  if (!folder) return print_error(folder.error());
-  const auto freed = folder->prune(command.keep);
-  if (!freed) return print_error(freed.error());
+void add_list(CommandLine& ship) {
+  CommandLine& line =
+      ship.command("list", "List releases with their dates, sizes, bundles and expiry");
+  const auto list = std::make_shared<ListCommand>();
+  line.option("--to", &list->folder, "Release folder", {.type = "DIR", .required = true});
+  line.flag("--json", list->json, "Print as JSON");
+  line.footer(ship_example("  modar ship list --to /var/www/ar\n"));
+  line.run([list] { return run_list(*list); });
+}
+
+struct PruneCommand {
+  std::string folder;
+  std::uint64_t keep = 2;
+  bool json = false;
+};
+
+Result<ExitCode> run_prune(const PruneCommand& command) {
+  MODAR_ASSIGN(const auto folder, ReleaseFolder::open(command.folder));
+  MODAR_ASSIGN(const auto freed, folder.prune(command.keep));
   if (command.json) {
-    std::fputs(prune_json(*freed, folder->versions()).c_str(), stdout);
+    const Json releases = Json::list(folder.versions());
+    std::fputs(Json({{"freed_bytes", freed}, {"releases", releases}}).dump().c_str(), stdout);
   } else {
-    std::fprintf(stderr, "%s freed\n", human_bytes(*freed).c_str());
+    std::fprintf(stderr, "%s freed\n", human_bytes(freed).c_str());
   }
-  return static_cast<int>(ExitCode::kOk);
+  return ExitCode::kOk;
 }
 
-int run_verify(const VerifyCommand& command) {
-  const auto key = read_public(command.trust, parse_root_set);
-  if (!key) return print_error(key.error());
-  const auto read = is_web_address(command.place)
-                        ? web_reader(command.place)
-                        : Result<ReleaseReader>(read_release_folder(command.place));
-  if (!read) return print_error(read.error());
+void add_prune(CommandLine& ship) {
+  CommandLine& line =
+      ship.command("prune", "Remove old releases and the files that only they need");
+  const auto prune = std::make_shared<PruneCommand>();
+  line.option("--to", &prune->folder, "Release folder", {.type = "DIR", .required = true});
+  line.option("--keep", &prune->keep, "Number of newest releases to keep",
+              {.shows_default = true, .least = 1, .most = 1000000});
+  line.flag("--json", prune->json, "Print the removed files as JSON");
+  line.footer(ship_example("  modar ship prune --to /var/www/ar --keep 3\n"));
+  line.run([prune] { return run_prune(*prune); });
+}
+
+struct VerifyCommand {
+  std::string place;  ///< a folder, or the address of a mirror
+  std::string trust;  ///< file of the public key that devices are given
+  bool json = false;
+};
+
+std::string verify_json(const VerifyReport& report) {
+  const Json damaged = Json::list(report.damaged, [&](const DamagedObject& object) -> Json {
+    return {{"path", object.path}, {"bundle", object.bundle}, {"cause", object.cause}};
+  });
+  return Json({{"version", report.release.version},
+               {"epoch", report.release.epoch},
+               {"expires", time_text(report.release.expires)},
+               {"key", to_hex(report.key.id)},
+               {"bundles", report.release.bundles.size()},
+               {"objects", report.objects},
+               {"bytes", report.bytes},
+               {"damaged", damaged}})
+      .dump();
+}
+
+Result<ExitCode> run_verify(const VerifyCommand& command) {
+  MODAR_ASSIGN(const auto key, read_trust(command.trust));
+  MODAR_ASSIGN(const auto read, is_web_address(command.place)
+                                    ? web_reader(command.place)
+                                    : Result<ReleaseReader>(read_release_folder(command.place)));
   ProgressBar bar(command.json);
-  const auto report = verify_release(*read, *key, [&](double done) { bar.show("verify", done); });
+  auto verified = verify_release(read, key, [&](double done) { bar.show("verify", done); });
   bar.clear();
-  if (!report) return print_error(report.error());
-  if (command.json) std::fputs(verify_json(*report).c_str(), stdout);
-  for (const DamagedObject& object : report->damaged) {
+  MODAR_ASSIGN(const VerifyReport report, std::move(verified));
+  if (command.json) std::fputs(verify_json(report).c_str(), stdout);
+  for (const DamagedObject& object : report.damaged) {
     std::fprintf(stderr, "%s: %s; the bundle %s needs it\n", object.path.c_str(),
                  object.cause.c_str(), object.bundle.c_str());
   }
-  if (!report->damaged.empty()) {
-    return print_error({ExitCode::kInvalidInput, "ship.damaged", command.place,
-                        std::to_string(report->damaged.size()) + " of " +
-                            std::to_string(report->objects) + " objects are damaged",
-                        "remove them and publish their bundles again, or copy them again"});
+  if (!report.damaged.empty()) {
+    return fail(ExitCode::kInvalidInput, "ship.damaged", command.place,
+                std::to_string(report.damaged.size()) + " of " + std::to_string(report.objects) +
+                    " objects are damaged",
+                "remove them and publish their bundles again, or copy them again");
   }
   if (!command.json) {
     std::fprintf(stderr, "release %llu is complete: %zu bundles, %llu objects, %s; %s\n",
-                 static_cast<unsigned long long>(report->release.version),
-                 report->release.bundles.size(), static_cast<unsigned long long>(report->objects),
-                 human_bytes(report->bytes).c_str(), expiry_text(report->release.expires).c_str());
+                 static_cast<unsigned long long>(report.release.version),
+                 report.release.bundles.size(), static_cast<unsigned long long>(report.objects),
+                 human_bytes(report.bytes).c_str(), expiry_text(report.release.expires).c_str());
   }
-  return static_cast<int>(ExitCode::kOk);
+  return ExitCode::kOk;
 }
 
-int run_plan(const PlanCommand& command) {
+void add_verify(CommandLine& ship) {
+  CommandLine& line =
+      ship.command("verify", "Verify all signatures and objects of a release folder or mirror");
+  const auto verify = std::make_shared<VerifyCommand>();
+  line.option("place", &verify->place, "Folder or address that devices fetch from",
+              {.type = "DIR|URL", .required = true});
+  line.option("--trust", &verify->trust, "Public key that devices trust",
+              {.type = "K.pub", .required = true});
+  line.flag("--json", verify->json, "Print the result as JSON");
+  line.footer(
+      example("  modar ship verify https://museum.example/ar --trust museum.key.pub\n",
+              ", 10 another key signed it, 13 files of different releases, 3 objects are damaged"));
+  line.run([verify] { return run_verify(*verify); });
+}
+
+struct PlanCommand {
+  std::string old_bundle;
+  std::string new_bundle;
+  std::string link = "2g";
+  std::string device;
+  RecipeOptions recipe;
+  bool json = false;
+};
+
+std::string plan_json(const UpdatePlan& plan, const Link& link, const std::string& device,
+                      double minutes) {
+  const Json json = {{"link", link.name},
+                     {"link_source", link.source},
+                     {"device", device},
+                     {"full_bytes", plan.full_bytes},
+                     {"update_bytes", plan.update_bytes},
+                     {"update_pieces", plan.update_pieces},
+                     {"transfer_seconds", plan.transfer_s},
+                     {"install_seconds", plan.install_s},
+                     {"geometry_bytes", plan.geometry_bytes},
+                     {"geometry_instructions_per_byte", kGeometryInstructions},
+                     {"other_bytes", plan.other_bytes},
+                     {"other_instructions_per_byte", kOtherInstructions},
+                     {"minutes", minutes},
+                     {"storage_bytes", plan.storage_bytes}};
+  return json.dump();
+}
+
+Result<ExitCode> run_plan(const PlanCommand& command) {
   const Link* link = find_link(command.link);
   if (link == nullptr) {
-    return print_error({ExitCode::kUsage, "ship.link", command.link, "there is no such network",
-                        "choose from 2g, 3g, 4g, wifi"});
+    return fail(ExitCode::kUsage, "ship.link", command.link, "there is no such network",
+                "choose from 2g, 3g, 4g, wifi");
   }
   const DeviceProfile* device =
       command.device.empty() ? nullptr : find_device_profile(command.device);
   if (!command.device.empty() && device == nullptr) {
-    return print_error({ExitCode::kUsage, "ship.device", command.device,
-                        "there is no such device profile",
-                        "choose from " + device_profile_names()});
+    return fail(ExitCode::kUsage, "ship.device", command.device, "there is no such device profile",
+                "choose from " + device_profile_names());
   }
-  const auto plan = plan_update(command.old_bundle, command.new_bundle, *link, command.recipe);
-  if (!plan) return print_error(plan.error());
-  const double minutes = (plan->transfer_s + plan->install_s) / 60;
+  MODAR_ASSIGN(const auto plan,
+               plan_update(command.old_bundle, command.new_bundle, *link, command.recipe));
+  const double minutes = (plan.transfer_s + plan.install_s) / 60;
   if (command.json) {
-    std::fputs(plan_json(*plan, *link, command.device, minutes).c_str(), stdout);
-    return static_cast<int>(ExitCode::kOk);
+    std::fputs(plan_json(plan, *link, command.device, minutes).c_str(), stdout);
+    return ExitCode::kOk;
   }
-  std::printf("update: %s in %u pieces (everything: %s)\n", human_bytes(plan->update_bytes).c_str(),
-              plan->update_pieces, human_bytes(plan->full_bytes).c_str());
+  std::printf("update: %s in %u pieces (everything: %s)\n", human_bytes(plan.update_bytes).c_str(),
+              plan.update_pieces, human_bytes(plan.full_bytes).c_str());
   std::printf("%s: %.1f minutes (%.0f s on the network, %.0f s to install)\n", link->name, minutes,
-              plan->transfer_s, plan->install_s);
+              plan.transfer_s, plan.install_s);
   std::printf(
       "time to install: assumes %.0f instructions a byte of geometry (%s) and %.0f a byte of the "
       "rest "
       "(%s), as counted on x86-64, 800 million instructions a second and flash that writes 8 "
       "MB/s\n",
-      kGeometryInstructions, human_bytes(plan->geometry_bytes).c_str(), kOtherInstructions,
-      human_bytes(plan->other_bytes).c_str());
-  std::printf("free space that it needs: %s\n", human_bytes(plan->storage_bytes).c_str());
-  return static_cast<int>(ExitCode::kOk);
+      kGeometryInstructions, human_bytes(plan.geometry_bytes).c_str(), kOtherInstructions,
+      human_bytes(plan.other_bytes).c_str());
+  std::printf("free space that it needs: %s\n", human_bytes(plan.storage_bytes).c_str());
+  return ExitCode::kOk;
+}
+
+void add_ship_plan(CommandLine& ship) {
+  CommandLine& line =
+      ship.command("plan", "Estimate the size and time of an update before publishing");
+  const auto plan = std::make_shared<PlanCommand>();
+  plan->recipe.jobs = std::max(1u, std::thread::hardware_concurrency());
+  line.option("old", &plan->old_bundle, "Bundle that devices have",
+              {.type = "OLD", .required = true});
+  line.option("new", &plan->new_bundle, "Bundle that they will get",
+              {.type = "NEW", .required = true});
+  line.option("--link", &plan->link, "Network: 2g, 3g, 4g or wifi", {.shows_default = true});
+  line.option("--device", &plan->device,
+              "Device profile: cores and storage (" + device_profile_names() + ")",
+              {.type = "NAME"});
+  line.option("--jobs", &plan->recipe.jobs, "Processes", {.least = 1, .most = 256});
+  line.flag("--json", plan->json, "Print as JSON");
+  line.footer(ship_example("  modar ship plan old.modar new.modar --link 2g --device ace2\n") +
+              "For a device on a cable, use `adb push NAME.modar /sdcard/modar/`.\n");
+  line.run([plan] { return run_plan(*plan); });
+}
+
+}  // namespace
+
+void add_ship(CommandLine& program) {
+  CommandLine& line = program.command(
+      "ship",
+      "Publish signed releases: keygen, publish, list, root, trust, sign, accept, rotate, "
+      "refresh, prune, verify, plan");
+  add_keygen(line);
+  add_publish(line);
+  add_list(line);
+  add_root(line);
+  add_trust(line);
+  add_sign(line);
+  add_accept(line);
+  add_rotate(line);
+  add_refresh(line);
+  add_prune(line);
+  add_verify(line);
+  add_ship_plan(line);
 }
 
 }  // namespace modar
