@@ -25,7 +25,7 @@ OPENCV_FILES = (
 )
 THIRD_PARTIES = {
     "opencv2/": OPENCV_FILES,
-    "OpenMesh/": (r"bake/mesh/topology/mesh_topology\.cpp", r"tests/.*"),
+    "OpenMesh/": (r"bake/mesh/repair/half_edges\.cpp", r"tests/.*"),
     "draco/": (r"bake/[a-z_/]*draco[a-z_]*\.cpp", r"tests/.*"),
     "tiny_gltf": (r"bake/(import/gltf|export)/(glb|gltf)_[a-z_]*\.cpp", r"bake/import/gltf/tinygltf_library\.[ch]pp",
                   r"tests/.*"),
@@ -109,7 +109,6 @@ DOORS = {
     "bake/mesh/clip": ("movement.hpp",),
     "bake/mesh/weld": ("weld.hpp", "triangulate.hpp"),
     "bake/mesh/repair": ("repair.hpp",),
-    "bake/mesh/topology": ("mesh_topology.hpp",),
     "bake/mesh/rays": ("triangle_tree.hpp", "occlusion.hpp"),
     "bake/mesh/pack": ("pack.hpp", "chunk.hpp", "vertex_codec.hpp"),
     "bake/mesh/lod": ("mesh_levels.hpp", "reduce.hpp"),

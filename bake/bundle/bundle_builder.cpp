@@ -22,7 +22,6 @@
 #include "bake/mesh/pack/pack.hpp"
 #include "bake/mesh/rays/occlusion.hpp"
 #include "bake/mesh/repair/repair.hpp"
-#include "bake/mesh/topology/mesh_topology.hpp"
 #include "bake/mesh/upright.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "bake/options/options.hpp"
@@ -314,10 +313,7 @@ Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& 
   report.defects.push_back(count_defects(*mesh, request.repairs(), viewer, report));
   draw_backs(*mesh, report.defects.back().backs, report);
   if (request.topology) {
-    TopologyOptions options;
-    options.jobs = request.jobs;
-    options.half_edge_bytes = request.memory_bytes / 4;
-    report.topologies.push_back(measure_topology(*mesh, options, report));
+    report.topologies.push_back(measure_topology(*mesh, request.memory_bytes / 4, report));
   }
   if (request.most_triangles != 0) {
     *mesh = reduce(std::move(*mesh), request.most_triangles, report);

@@ -8,7 +8,6 @@
 #include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/mesh/lod/reduce.hpp"
 #include "bake/mesh/rays/occlusion.hpp"
-#include "bake/mesh/topology/mesh_topology.hpp"
 #include "bake/mesh/upright.hpp"
 #include "tests/fuzz/made_model.hpp"
 #include "tests/mesh/stages.hpp"
@@ -48,7 +47,7 @@ std::uint64_t blocks_of(const test::Part& part) {
   Result<TriMesh> mesh = weld(source, report);
   if (!mesh) return blocks - before;
   find_up(*mesh);
-  measure_topology(*mesh, {}, report);
+  measure_topology(*mesh, 0, report);
   reduce(TriMesh(*mesh), part.triangles / 4, report);
   ChunkedMesh chunked = testing::chunked(std::move(*mesh), kMaxChunkVertices);
   chunked.mesh.occlusion = measure_occlusion(chunked, 1, report);

@@ -14,7 +14,6 @@
 #include "bake/import/read_model.hpp"
 #include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/mesh/repair/repair.hpp"
-#include "bake/mesh/topology/mesh_topology.hpp"
 #include "bake/mesh/weld/weld.hpp"
 #include "formats/transport/chunk_order.hpp"
 
@@ -84,7 +83,7 @@ int probe_topology(const std::string& path, unsigned jobs) {
   if (!mesh) return complain(mesh.error());
   Report report;
   const Stopwatch watch;
-  measure_topology(*mesh, {jobs, 0}, report);
+  measure_topology(*mesh, 0, report);
   return 0;
 }
 

@@ -12,33 +12,6 @@ namespace {
 
 using namespace repair;
 
-/// The corners of a mesh by the positions of its source, and these.
-struct Counted {
-  explicit Counted(const TriMesh& mesh) : corners(3 * mesh.triangles.size()) {
-    for (std::size_t c = 0; c < corners.size(); ++c) {
-      corners[c] = mesh.source_position(mesh.triangles[c / 3][c % 3]);
-    }
-    if (mesh.source_positions.empty()) {
-      positions = std::span(mesh.positions.data(), mesh.positions.size());
-      return;
-    }
-    std::uint32_t count = 0;
-    for (const std::uint32_t p : mesh.source_positions) count = std::max(count, p + 1);
-    own.assign(count, glm::dvec3(0.0));
-    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-      own[mesh.source_positions[v]] = mesh.positions[v];
-    }
-    positions = std::span(own.data(), own.size());
-  }
-  [[nodiscard]] Faces surface() const {
-    return {std::span(corners.data(), corners.size()), positions};
-  }
-
-  Array<std::uint32_t> corners;
-  Array<glm::dvec3> own;
-  std::span<const glm::dvec3> positions;
-};
-
 Array<std::uint8_t> clean_positions(const Faces& surface, const Around& around) {
   Array<std::uint8_t> clean(surface.positions.size());
   for (std::uint32_t v = 0; v < clean.size(); ++v) {
@@ -91,25 +64,8 @@ class Counter {
   void count_position(std::uint32_t v) {
     const std::span<const std::uint32_t> corners = around_.at(v);
     if (corners.size() < 2) return;
-    spokes_.clear();
-    Sets fans(corners.size());
-    std::size_t left = corners.size();
-    for (std::uint32_t i = 0; i < corners.size(); ++i) {
-      const std::uint32_t ahead = surface_.corners[next(corners[i])];
-      const std::uint32_t behind = surface_.corners[previous(corners[i])];
-      spokes_.push_back({ahead, i});
-      spokes_.push_back({behind, i});
-    }
-    std::sort(spokes_.begin(), spokes_.end());
-    for (std::size_t i = 1; i < spokes_.size(); ++i) {
-      if (spokes_[i][0] != spokes_[i - 1][0] ||
-          fans.root(spokes_[i][1]) == fans.root(spokes_[i - 1][1])) {
-        continue;
-      }
-      fans.join(spokes_[i][1], spokes_[i - 1][1]);
-      --left;
-    }
-    if (left > 1) ++defects_.of(Defect::kVertex).count;
+    fans_.read(surface_, corners);
+    if (fans_.count > 1) ++defects_.of(Defect::kVertex).count;
     each_repeated(surface_, corners, v,
                   [&](std::uint32_t) { ++defects_.of(Defect::kDuplicate).count; });
   }
@@ -120,7 +76,7 @@ class Counter {
   MeshDefects& defects_;
   std::vector<std::uint32_t> open_;    // half-edges
   std::vector<std::uint32_t> turned_;  // of changes of winding
-  std::vector<std::array<std::uint32_t, 2>> spokes_;
+  Fans fans_;
 };
 
 /// One line that names the option, or what it left.
@@ -144,7 +100,7 @@ MeshDefects count_defects(const TriMesh& mesh, bool repaired, const glm::dvec3& 
   StageTimer timer(report, "defects");
   MeshDefects defects;
   defects.model = mesh.name;
-  Counted counted(mesh);
+  SourceFaces counted(mesh);
   auto around = std::make_unique<Around>(counted.surface());
   Array<std::uint8_t> clean = clean_positions(counted.surface(), *around);
   const auto all = [](std::uint32_t, std::uint32_t) { return true; };

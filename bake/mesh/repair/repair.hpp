@@ -1,5 +1,5 @@
-// Repairs scans: what repair() changes, and a count of the same defects for meshes it does not
-// change.
+// Repairs scans: what repair() changes, a count of the same defects for meshes it does not change,
+// and the topology of a mesh: components, boundary loops, parts that are not manifold.
 #pragma once
 
 #include "bake/import/source_model.hpp"
@@ -19,5 +19,10 @@ MeshDefects repair_model(SourceModel& model, bool support, Report& report);
 /// of the pattern, in the mesh's coordinates; zero: unknown. Takes a hundredth of a bake.
 MeshDefects count_defects(const TriMesh& mesh, bool repaired, const glm::dvec3& viewer,
                           Report& report);
+
+/// Measures a mesh without changing it. Adds diagnostics that modellers want to know:
+/// "model.non-manifold", "model.duplicate-faces", "model.flipped", "model.copied-faces".
+/// half_edge_bytes: that OpenMesh's mesh may take; 0: no limit.
+MeshTopology measure_topology(const TriMesh& mesh, std::uint64_t half_edge_bytes, Report& report);
 
 }  // namespace modar

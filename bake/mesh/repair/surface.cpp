@@ -20,6 +20,23 @@ constexpr double kHoleDiagonal = 0.01;
 
 }  // namespace
 
+SourceFaces::SourceFaces(const TriMesh& mesh) : corners(3 * mesh.triangles.size()) {
+  for (std::size_t c = 0; c < corners.size(); ++c) {
+    corners[c] = mesh.source_position(mesh.triangles[c / 3][c % 3]);
+  }
+  if (mesh.source_positions.empty()) {
+    positions = std::span(mesh.positions.data(), mesh.positions.size());
+    return;
+  }
+  std::uint32_t count = 0;
+  for (const std::uint32_t p : mesh.source_positions) count = std::max(count, p + 1);
+  own.assign(count, glm::dvec3(0.0));
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    own[mesh.source_positions[v]] = mesh.positions[v];
+  }
+  positions = std::span(own.data(), own.size());
+}
+
 Around::Around(const Faces& surface)
     : first(surface.positions.size() + 1, 0), corners(surface.corners.size()) {
   for (const std::uint32_t v : surface.corners) ++first[v + std::size_t{1}];
@@ -49,6 +66,28 @@ bool regular(const Faces& surface, std::span<const std::uint32_t> corners) {
     std::swap(links[i + 1], links[found]);
   }
   return links[corners.size() - 1][1] == links[0][0];
+}
+
+void Fans::read(const Faces& surface, std::span<const std::uint32_t> corners) {
+  spokes.clear();
+  sets.reset(corners.size());
+  count = corners.size();
+  for (std::uint32_t i = 0; i < corners.size(); ++i) {
+    const std::uint32_t c = corners[i];
+    spokes.push_back({surface.corners[next(c)], i, c});
+    spokes.push_back({surface.corners[previous(c)], i, previous(c)});
+  }
+  std::sort(spokes.begin(), spokes.end(), [](const Spoke& a, const Spoke& b) {
+    return a.neighbour != b.neighbour ? a.neighbour < b.neighbour : a.number < b.number;
+  });
+  for (std::size_t i = 1; i < spokes.size(); ++i) {
+    if (spokes[i].neighbour != spokes[i - 1].neighbour ||
+        sets.root(spokes[i].number) == sets.root(spokes[i - 1].number)) {
+      continue;
+    }
+    sets.join(spokes[i].number, spokes[i - 1].number);
+    --count;
+  }
 }
 
 Components::Components(const Faces& surface, std::span<const std::uint32_t> open)

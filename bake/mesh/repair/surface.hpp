@@ -14,6 +14,8 @@
 #include <glm/vec3.hpp>
 
 #include "bake/memory/array.hpp"
+#include "bake/mesh/tri_mesh.hpp"
+#include "bake/report.hpp"
 
 namespace modar::repair {
 
@@ -55,6 +57,18 @@ struct Faces {
   [[nodiscard]] double area(std::size_t t) const { return glm::length(area_vector(t)); }
 };
 
+/// A mesh over the positions of its source, where vertices that differ in uv or normal are one.
+struct SourceFaces {
+  explicit SourceFaces(const TriMesh& mesh);
+  [[nodiscard]] Faces surface() const {
+    return {std::span(corners.data(), corners.size()), positions};
+  }
+
+  Array<std::uint32_t> corners;
+  Array<glm::dvec3> own;  ///< empty: the mesh's are used
+  std::span<const glm::dvec3> positions;
+};
+
 /// The corners at each position.
 struct Around {
   explicit Around(const Faces& surface);
@@ -91,16 +105,18 @@ void for_each_edge(const Faces& surface, const Around& around, const Wanted& wan
   }
 }
 
-/// Calls visit(corner) for triangles that repeat another one in its winding, of those around the
-/// lowest of their positions.
+/// Calls visit(corner) for triangles that repeat another one in its winding, or in any, of those
+/// around the lowest of their positions.
 template <class Visit>
 void each_repeated(const Faces& surface, std::span<const std::uint32_t> corners,
-                   std::uint32_t position, const Visit& visit) {
+                   std::uint32_t position, const Visit& visit, bool any_winding = false) {
   std::vector<std::array<std::uint32_t, 3>> others;  // positions ahead and behind, corner
   for (const std::uint32_t c : corners) {
     const std::uint32_t ahead = surface.corners[next(c)];
     const std::uint32_t behind = surface.corners[previous(c)];
-    if (position < ahead && position < behind) others.push_back({ahead, behind, c});
+    if (position >= ahead || position >= behind) continue;
+    others.push_back({ahead, behind, c});
+    if (any_winding && ahead > behind) others.back() = {behind, ahead, c};
   }
   std::sort(others.begin(), others.end());
   for (std::size_t i = 1; i < others.size(); ++i) {
@@ -162,7 +178,9 @@ std::size_t join_open_edges(std::span<std::uint32_t> corners, std::span<const gl
 /// Disjoint sets of numbers; the lowest names a set.
 class Sets {
  public:
-  explicit Sets(std::size_t count) : parent_(count) {
+  explicit Sets(std::size_t count) { reset(count); }
+  void reset(std::size_t count) {
+    parent_.resize(count);
     for (std::uint32_t v = 0; v < count; ++v) parent_[v] = v;
   }
   std::uint32_t root(std::uint32_t v) {
@@ -178,6 +196,21 @@ class Sets {
 
  private:
   Array<std::uint32_t> parent_;
+};
+
+/// The edges at a position, and the fans that they make of its triangles. Reads one after another.
+struct Fans {
+  /// An edge of a triangle; those of one edge are next to each other.
+  struct Spoke {
+    std::uint32_t neighbour = 0;  ///< position at its other end
+    std::uint32_t number = 0;     ///< of the triangle, among those at the position
+    std::uint32_t half_edge = 0;
+  };
+  void read(const Faces& surface, std::span<const std::uint32_t> corners);
+
+  std::vector<Spoke> spokes;
+  Sets sets{0};           ///< of the numbers of triangles
+  std::size_t count = 0;  ///< fans
 };
 
 /// Parts of a surface that share no position.
@@ -216,6 +249,9 @@ std::map<std::uint32_t, Loop> open_loops(const Faces& surface, std::span<const s
 
 /// Whether an open loop is a hole of a part, and not its rim.
 bool small_hole(const PointBox& loop, const PointBox& part);
+
+/// What OpenMesh makes of a surface.
+HalfEdgeCount count_half_edges(const Faces& surface);
 
 /// See MeshDefects::backs. turned: a half-edge of each change of winding. materials: of triangles.
 /// viewer: as for count_defects().
