@@ -8,9 +8,8 @@
 #include <ctime>
 #include <span>
 
-#include <rapidjson/prettywriter.h>
-
 #include "formats/base/atomic_file.hpp"
+#include "formats/json_writer.hpp"
 #include "modar/fetch.hpp"
 #include "modar/release.hpp"
 #include "runtime/platform/command_line.hpp"
@@ -203,38 +202,28 @@ class WaitPrinter {
   unsigned attempt_ = 0;
 };
 
-using Writer = rapidjson::PrettyWriter<rapidjson::StringBuffer>;
-
-void write_paths(Writer& json, const char* key, const std::vector<std::string>& bundles) {
-  json.Key(key);
-  json.StartArray();
-  for (const std::string& bundle : bundles) json.String(bundle.c_str());
-  json.EndArray();
+void write_paths(JsonWriter& json, const char* key, const std::vector<std::string>& bundles) {
+  json.array(key, [&] {
+    for (const std::string& bundle : bundles) json.add(bundle);
+  });
 }
 
 void print_json(const FetchReport& report) {
-  rapidjson::StringBuffer buffer;
-  Writer json(buffer);
-  json.StartObject();
-  const auto put = [&](const char* key, std::uint64_t value) {
-    json.Key(key);
-    json.Uint64(value);
-  };
-  put("epoch", report.epoch);
-  put("version", report.version);
-  json.Key("expires");
-  json.String(time_text(report.expires).c_str());
-  json.Key("changed");
-  json.Bool(report.changed);
-  write_paths(json, "bundles", report.bundles);
-  put("downloaded_bytes", report.downloaded_bytes);
-  put("downloaded_pieces", report.downloaded_pieces);
-  put("reused_bytes", report.reused_bytes);
-  put("reused_pieces", report.reused_pieces);
-  put("retries", report.retries);
-  put("corrupt_pieces", report.corrupt_pieces);
-  json.EndObject();
-  std::puts(buffer.GetString());
+  JsonWriter json(4);
+  json.object([&] {
+    json.put("epoch", report.epoch);
+    json.put("version", report.version);
+    json.put("expires", time_text(report.expires));
+    json.put("changed", report.changed);
+    write_paths(json, "bundles", report.bundles);
+    json.put("downloaded_bytes", report.downloaded_bytes);
+    json.put("downloaded_pieces", report.downloaded_pieces);
+    json.put("reused_bytes", report.reused_bytes);
+    json.put("reused_pieces", report.reused_pieces);
+    json.put("retries", report.retries);
+    json.put("corrupt_pieces", report.corrupt_pieces);
+  });
+  std::puts(json.str().c_str());
 }
 
 /// What the operator of many devices collects. The keys are a contract (formats/shipping.md).
@@ -248,31 +237,24 @@ struct Status {
 
 void write_status(const CommandLine& line, const Status& status) {
   if (line.status_file.empty()) return;
-  rapidjson::StringBuffer buffer;
-  Writer json(buffer);
-  const auto text = [&](const char* key, const std::string& value) {
-    json.Key(key);
-    json.String(value.c_str());
-  };
   const Error* error = status.error;
-  json.StartObject();
-  text("program", "modar-fetch " MODAR_VERSION);
-  text("time", time_text(std::time(nullptr)));
-  text("action", line.verify ? "verify" : "fetch");
-  text("result", error == nullptr ? status.result : error->code);
-  json.Key("exit_code");
-  json.Int(error == nullptr ? 0 : static_cast<int>(error->exit));
-  text("message", error == nullptr ? "" : to_line(*error));
-  json.Key("version");
-  json.Uint64(status.version);
-  json.Key("changed");
-  json.Bool(status.changed);
-  write_paths(json, "bundles", status.bundles);
-  write_paths(json, "first", previews(line.options.store));
-  json.EndObject();
-  buffer.Put('\n');
-  const std::string_view all(buffer.GetString(), buffer.GetSize());
-  if (auto written = write_file(line.status_file, all); !written) answer(written.error());
+  JsonWriter json(4);
+  json.object([&] {
+    json.put("program", "modar-fetch " MODAR_VERSION);
+    json.put("time", time_text(std::time(nullptr)));
+    json.put("action", line.verify ? "verify" : "fetch");
+    json.put("result", error == nullptr ? status.result : error->code);
+    json.put("exit_code", error == nullptr ? 0 : static_cast<int>(error->exit));
+    json.put("message", error == nullptr ? "" : to_line(*error));
+    json.put("version", status.version);
+    json.put("changed", status.changed);
+    write_paths(json, "bundles", status.bundles);
+    write_paths(json, "first", previews(line.options.store));
+  });
+  const std::string text = json.str() + "\n";
+  if (auto written = write_file(line.status_file, std::string_view(text)); !written) {
+    answer(written.error());
+  }
 }
 
 /// The release in use during the fetch, or after it failed.
@@ -323,16 +305,13 @@ int run_verify(const CommandLine& line) {
   if (!report) return fail_with_status(line, report.error());
   write_status(line, {nullptr, "ok", report->version, report->fell_back, report->bundles});
   if (line.json) {
-    rapidjson::StringBuffer buffer;
-    Writer json(buffer);
-    json.StartObject();
-    json.Key("version");
-    json.Uint64(report->version);
-    json.Key("fell_back");
-    json.Bool(report->fell_back);
-    write_paths(json, "bundles", report->bundles);
-    json.EndObject();
-    std::puts(buffer.GetString());
+    JsonWriter json(4);
+    json.object([&] {
+      json.put("version", report->version);
+      json.put("fell_back", report->fell_back);
+      write_paths(json, "bundles", report->bundles);
+    });
+    std::puts(json.str().c_str());
   } else if (!line.quiet) {
     std::fprintf(stderr, "release %" PRIu64 " is good%s\n", report->version,
                  report->fell_back ? "; the one after it was damaged and is no longer used" : "");

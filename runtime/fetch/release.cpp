@@ -9,8 +9,9 @@
 #include <set>
 
 #include <rapidjson/document.h>
-#include <rapidjson/prettywriter.h>
 #include <sodium.h>
+
+#include "formats/json_writer.hpp"
 
 namespace modar {
 
@@ -384,47 +385,30 @@ Result<rapidjson::Document> parse_document(std::string_view json, const char* fo
   return document;
 }
 
-using Writer = rapidjson::PrettyWriter<rapidjson::StringBuffer>;
-
-void put(Writer& json, const char* key, const std::string& text) {
-  json.Key(key);
-  json.String(text.data(), static_cast<rapidjson::SizeType>(text.size()));
-}
-
-void put(Writer& json, const char* key, std::uint64_t number) {
-  json.Key(key);
-  json.Uint64(number);
-}
-
 /// A document of that format, whose other members `fill` puts.
 template <class Fill>
 std::string document_text(const char* format, const Fill& fill) {
-  rapidjson::StringBuffer buffer;
-  Writer json(buffer);
-  json.SetIndent(' ', 1);
-  json.StartObject();
-  put(json, "format", format);
-  put(json, "format_version", std::uint64_t{1});
-  fill(json);
-  json.EndObject();
-  return std::string(buffer.GetString(), buffer.GetSize()) + "\n";
+  JsonWriter json(1);
+  json.object([&] {
+    json.put("format", format);
+    json.put("format_version", 1);
+    fill(json);
+  });
+  return json.str() + "\n";
 }
 
-void write_bundle(Writer& json, const ReleaseBundle& bundle) {
-  json.StartObject();
-  put(json, "name", bundle.name);
-  put(json, "size", bundle.size);
-  put(json, "hash", to_hex(bundle.hash));
-  put(json, "recipe", to_hex(bundle.recipe));
-  put(json, "recipe_size", bundle.recipe_size);
-  put(json, "recipe_raw_size", bundle.recipe_raw_size);
-  put(json, "pieces", bundle.pieces);
-  put(json, "download_size", bundle.download_size);
-  json.Key("devices");
-  json.StartArray();
-  for (const std::string& device : bundle.devices) json.String(device.c_str());
-  json.EndArray();
-  json.EndObject();
+void write_bundle(JsonWriter& json, const ReleaseBundle& bundle) {
+  json.put("name", bundle.name);
+  json.put("size", bundle.size);
+  json.put("hash", to_hex(bundle.hash));
+  json.put("recipe", to_hex(bundle.recipe));
+  json.put("recipe_size", bundle.recipe_size);
+  json.put("recipe_raw_size", bundle.recipe_raw_size);
+  json.put("pieces", bundle.pieces);
+  json.put("download_size", bundle.download_size);
+  json.array("devices", [&] {
+    for (const std::string& device : bundle.devices) json.add(device);
+  });
 }
 
 }  // namespace
@@ -463,15 +447,16 @@ Result<Release> parse_release(std::string_view json) {
 }
 
 std::string release_text(const Release& release) {
-  return document_text(kReleaseFormat, [&](Writer& json) {
-    if (release.epoch != 0) put(json, "epoch", release.epoch);
-    put(json, "version", release.version);
-    put(json, "expires", time_text(release.expires));
-    if (release.fresh_days != 0) put(json, "fresh_days", release.fresh_days);
-    json.Key("bundles");
-    json.StartArray();
-    for (const ReleaseBundle& bundle : release.bundles) write_bundle(json, bundle);
-    json.EndArray();
+  return document_text(kReleaseFormat, [&](JsonWriter& json) {
+    if (release.epoch != 0) json.put("epoch", release.epoch);
+    json.put("version", release.version);
+    json.put("expires", time_text(release.expires));
+    if (release.fresh_days != 0) json.put("fresh_days", release.fresh_days);
+    json.array("bundles", [&] {
+      for (const ReleaseBundle& bundle : release.bundles) {
+        json.object([&] { write_bundle(json, bundle); });
+      }
+    });
   });
 }
 
@@ -562,11 +547,11 @@ Result<Freshness> parse_freshness(std::string_view text) {
 }
 
 std::string freshness_text(const Freshness& freshness) {
-  return document_text(kFreshFormat, [&](Writer& json) {
-    if (freshness.epoch != 0) put(json, "epoch", freshness.epoch);
-    put(json, "version", freshness.version);
-    put(json, "time", time_text(freshness.time));
-    put(json, "expires", time_text(freshness.expires));
+  return document_text(kFreshFormat, [&](JsonWriter& json) {
+    if (freshness.epoch != 0) json.put("epoch", freshness.epoch);
+    json.put("version", freshness.version);
+    json.put("time", time_text(freshness.time));
+    json.put("expires", time_text(freshness.expires));
   });
 }
 
@@ -581,9 +566,9 @@ Result<KeyRotation> parse_key_rotation(std::string_view json) {
 }
 
 std::string key_rotation_text(const KeyRotation& link) {
-  return document_text(kKeyFormat, [&](Writer& json) {
-    put(json, "serial", std::uint64_t{link.serial});
-    put(json, "key", link.key);
+  return document_text(kKeyFormat, [&](JsonWriter& json) {
+    json.put("serial", std::uint64_t{link.serial});
+    json.put("key", link.key);
   });
 }
 
@@ -600,10 +585,10 @@ Result<RootMetadata> parse_root_metadata(std::string_view json) {
 }
 
 std::string root_metadata_text(const RootMetadata& word) {
-  return document_text(kRootFormat, [&](Writer& json) {
-    put(json, "epoch", word.epoch);
-    put(json, "links", std::uint64_t{word.links});
-    put(json, "key", word.key);
+  return document_text(kRootFormat, [&](JsonWriter& json) {
+    json.put("epoch", word.epoch);
+    json.put("links", std::uint64_t{word.links});
+    json.put("key", word.key);
   });
 }
 
@@ -626,9 +611,9 @@ Result<RootRotation> parse_root_rotation(std::string_view json) {
 }
 
 std::string root_rotation_text(const RootRotation& link) {
-  return document_text(kRootLinkFormat, [&](Writer& json) {
-    put(json, "serial", std::uint64_t{link.serial});
-    put(json, "roots", root_set_line(link.roots));
+  return document_text(kRootLinkFormat, [&](JsonWriter& json) {
+    json.put("serial", std::uint64_t{link.serial});
+    json.put("roots", root_set_line(link.roots));
   });
 }
 

@@ -5,7 +5,8 @@
 #include <utility>
 
 #include <rapidjson/document.h>
-#include <rapidjson/prettywriter.h>
+
+#include "formats/json_writer.hpp"
 
 namespace modar::fetch {
 
@@ -127,31 +128,21 @@ StoreState Store::state() const {
 }
 
 Result<void> Store::save_state(const StoreState& state) const {
-  rapidjson::StringBuffer buffer;
-  rapidjson::PrettyWriter<rapidjson::StringBuffer> json(buffer);
-  json.StartObject();
-  json.Key("epoch");
-  json.Uint64(state.epoch);
-  json.Key("version");
-  json.Uint64(state.version);
-  json.Key("root_key");
-  json.String(state.root_key.c_str());
-  if (!state.roots.empty()) {
-    json.Key("roots");
-    json.String(state.roots.c_str());
-    json.Key("root_serial");
-    json.Uint(state.root_serial);
-  }
-  json.Key("trusted_key");
-  json.String(state.trusted_key.c_str());
-  json.Key("key_serial");
-  json.Uint(state.key_serial);
-  json.Key("time");
-  json.Uint64(static_cast<std::uint64_t>(state.time));
-  json.EndObject();
-  const std::string_view text(buffer.GetString(), buffer.GetSize());
-  MODAR_TRY(root_.replace("state.json", text));
-  return slots_.replace("state.json", text);
+  JsonWriter json(4);
+  json.object([&] {
+    json.put("epoch", state.epoch);
+    json.put("version", state.version);
+    json.put("root_key", state.root_key);
+    if (!state.roots.empty()) {
+      json.put("roots", state.roots);
+      json.put("root_serial", state.root_serial);
+    }
+    json.put("trusted_key", state.trusted_key);
+    json.put("key_serial", state.key_serial);
+    json.put("time", state.time);
+  });
+  MODAR_TRY(root_.replace("state.json", json.str()));
+  return slots_.replace("state.json", json.str());
 }
 
 std::optional<InstalledRelease> read_slot(const Folder& folder) {

@@ -7,7 +7,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "json_text.hpp"
+#include "formats/json_writer.hpp"
 #include "modar/mapped_file.hpp"
 #include "recording.hpp"
 
@@ -161,31 +161,21 @@ std::string GoldenCheck::difference(const RecordedFrame& wanted, const FrameRepo
 }
 
 std::string GoldenCheck::line() const {
-  JsonText writer;
-  writer.open('{');
-  writer.key("golden");
-  writer.open('{');
-  writer.key("frames");
-  writer.count(recording_.frames.size());
-  writer.key("compared");
-  writer.count(next_);
-  writer.key("different");
-  writer.count(different_);
-  writer.key("tolerance_px");
-  writer.number(tolerance_);
-  writer.key("worst_px");
-  writer.number(worst_px_);
-  if (different_ > 0) {
-    writer.key("first");
-    writer.open('{');
-    writer.key("frame");
-    writer.count(first_frame_);
-    writer.key("what");
-    writer.text(first_what_);
-    writer.close('}');
-  }
-  writer.close('}');
-  writer.close('}');
+  JsonWriter writer;
+  const auto first = [&] {
+    writer.put("frame", first_frame_);
+    writer.put("what", first_what_);
+  };
+  writer.object([&] {
+    writer.object("golden", [&] {
+      writer.put("frames", recording_.frames.size());
+      writer.put("compared", next_);
+      writer.put("different", different_);
+      writer.put("tolerance_px", tolerance_);
+      writer.put("worst_px", worst_px_);
+      if (different_ > 0) writer.object("first", first);
+    });
+  });
   return writer.str();
 }
 

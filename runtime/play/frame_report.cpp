@@ -13,7 +13,7 @@
 #include <malloc.h>
 #endif
 
-#include "json_text.hpp"
+#include "formats/json_writer.hpp"
 #include "modar/pose.hpp"
 
 namespace modar {
@@ -50,109 +50,71 @@ StageTimes RunStats::quantile_ms(double share) const {
 
 namespace {
 
-void text(JsonText& writer, const char* key, std::string_view value) {
-  writer.key(key);
-  writer.text(value);
-}
-
-void count(JsonText& writer, const char* key, std::uint64_t value) {
-  writer.key(key);
-  writer.count(value);
-}
-
-void number(JsonText& writer, const char* key, double value) {
-  writer.key(key);
-  writer.number(value);
-}
-
 /// To three decimals, which times are worth.
-void rounded(JsonText& writer, const char* key, double value) {
-  number(writer, key, std::round(value * 1000.0) / 1000.0);
-}
-
-/// An object under a key, whose members `fill` writes.
-template <class Fill>
-void object(JsonText& writer, const char* key, const Fill& fill) {
-  writer.key(key);
-  writer.open('{');
-  fill();
-  writer.close('}');
-}
-
-/// An array under a key, whose elements `fill` writes.
-template <class Fill>
-void array(JsonText& writer, const char* key, const Fill& fill) {
-  writer.key(key);
-  writer.open('[');
-  fill();
-  writer.close(']');
+void rounded(JsonWriter& writer, const char* key, double value) {
+  writer.put(key, std::round(value * 1000.0) / 1000.0);
 }
 
 /// An object whose members fill(writer) writes, without a line's end.
 template <class Fill>
 std::string json_line(const Fill& fill) {
-  JsonText writer;
-  writer.open('{');
-  fill(writer);
-  writer.close('}');
+  JsonWriter writer;
+  writer.object([&] { fill(writer); });
   return writer.str();
 }
 
 /// Of the unit square to the corners.
-void homography(JsonText& writer, const std::array<glm::dvec2, 4>& corners) {
+void homography(JsonWriter& writer, const std::array<glm::dvec2, 4>& corners) {
   constexpr std::array<glm::dvec2, 4> kSquare = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
   const auto map = homography_from_points(kSquare, corners);
-  if (!map) return number(writer, "homography", NAN);
-  array(writer, "homography", [&] {
+  if (!map) return writer.put("homography", NAN);
+  writer.array("homography", [&] {
     for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) writer.number((*map)[column][row]);
+      for (int column = 0; column < 3; ++column) writer.add((*map)[column][row]);
     }
   });
 }
 
-void detection(JsonText& writer, const Detection& seen, std::span<const std::string> names,
+void detection(JsonWriter& writer, const Detection& seen, std::span<const std::string> names,
                bool homographies) {
-  writer.open('{');
-  text(writer, "pattern", seen.pattern < names.size() ? std::string_view(names[seen.pattern]) : "");
-  array(writer, "corners", [&] {
+  writer.put("pattern", seen.pattern < names.size() ? std::string_view(names[seen.pattern]) : "");
+  writer.array("corners", [&] {
     for (const glm::dvec2& corner : seen.corners) {
-      writer.open('[');
-      writer.number(corner.x);
-      writer.number(corner.y);
-      writer.close(']');
+      writer.array([&] {
+        writer.add(corner.x);
+        writer.add(corner.y);
+      });
     }
   });
-  array(writer, "rotation", [&] {
+  writer.array("rotation", [&] {
     for (int row = 0; row < 3; ++row) {
       // GLM's first index is the column.
       for (int column = 0; column < 3; ++column) {
-        writer.number(seen.pose.rotation[column][row]);
+        writer.add(seen.pose.rotation[column][row]);
       }
     }
   });
-  array(writer, "translation", [&] {
-    for (int i = 0; i < 3; ++i) writer.number(seen.pose.translation[i]);
+  writer.array("translation", [&] {
+    for (int i = 0; i < 3; ++i) writer.add(seen.pose.translation[i]);
   });
   if (seen.stretch != glm::dmat4x3(1.0)) {
-    array(writer, "stretch", [&] {
+    writer.array("stretch", [&] {
       for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 4; ++column) writer.number(seen.stretch[column][row]);
+        for (int column = 0; column < 4; ++column) writer.add(seen.stretch[column][row]);
       }
     });
   }
-  count(writer, "inliers", static_cast<std::uint64_t>(seen.inliers));
-  count(writer, "matches", static_cast<std::uint64_t>(seen.matches));
+  writer.put("inliers", seen.inliers);
+  writer.put("matches", seen.matches);
   rounded(writer, "fit", seen.matches > 0 ? std::min(1.0, 1.0 * seen.inliers / seen.matches) : 0.0);
   rounded(writer, "agreeing", seen.agreeing);
   rounded(writer, "likeness", seen.likeness);
   if (seen.extended) {
-    writer.key("extended");
-    writer.flag(true);
-    number(writer, "position_sigma", seen.position_sigma);
-    number(writer, "rotation_sigma", seen.rotation_sigma);
+    writer.put("extended", true);
+    writer.put("position_sigma", seen.position_sigma);
+    writer.put("rotation_sigma", seen.rotation_sigma);
   }
   if (homographies) homography(writer, seen.corners);
-  writer.close('}');
 }
 
 /// In pixels of the file, of a frame that was reduced.
@@ -164,39 +126,36 @@ FrameReport in_file(FrameReport report) {
   return report;
 }
 
-void camera(JsonText& writer, const CameraReport& camera) {
-  object(writer, "camera", [&] {
+void camera(JsonWriter& writer, const CameraReport& camera) {
+  writer.object("camera", [&] {
     rounded(writer, "focal_px", camera.focal.focal);
     if (camera.focal.estimated) rounded(writer, "sigma_px", camera.focal.sigma);
-    text(writer, "source",
-         camera.given             ? "given"
-         : camera.focal.estimated ? "estimated"
-                                  : "assumed");
+    writer.put("source", camera.given ? "given" : camera.focal.estimated ? "estimated" : "assumed");
   });
 }
 
-void times(JsonText& writer, const StageTimes& ms) {
-  object(writer, "ms", [&] {
+void times(JsonWriter& writer, const StageTimes& ms) {
+  writer.object("ms", [&] {
     for (std::size_t i = 0; i < ms.size(); ++i) rounded(writer, kStageNames[i], ms[i]);
   });
 }
 
 /// Of frames, by the reason why nothing was visible.
-void reasons(JsonText& writer, const RunStats& stats) {
-  object(writer, "reasons", [&] {
+void reasons(JsonWriter& writer, const RunStats& stats) {
+  writer.object("reasons", [&] {
     for (const Reason reason : kReasons) {
-      if (stats.count(reason) > 0) count(writer, to_string(reason), stats.count(reason));
+      if (stats.count(reason) > 0) writer.put(to_string(reason), stats.count(reason));
     }
   });
 }
 
-void scene(JsonText& writer, const SceneState& log) {
+void scene(JsonWriter& writer, const SceneState& log) {
   if (!log.commands.empty()) {
-    array(writer, "commands", [&] {
-      for (const std::string& each : log.commands) writer.text(each);
+    writer.array("commands", [&] {
+      for (const std::string& each : log.commands) writer.add(each);
     });
   }
-  if (!log.caption.empty()) text(writer, "caption", log.caption);
+  if (!log.caption.empty()) writer.put("caption", log.caption);
 }
 
 }  // namespace
@@ -217,16 +176,16 @@ const char* to_string(Shown state) {
 std::string frame_line(const FrameReport& frame, std::span<const std::string> pattern_names,
                        bool homographies) {
   const FrameReport report = in_file(frame);
-  return json_line([&](JsonText& writer) {
-    count(writer, "frame", report.frame);
-    number(writer, "time_s", report.time_s);
-    array(writer, "visible", [&] {
+  return json_line([&](JsonWriter& writer) {
+    writer.put("frame", report.frame);
+    writer.put("time_s", report.time_s);
+    writer.array("visible", [&] {
       for (const Detection& seen : report.visible) {
-        detection(writer, seen, pattern_names, homographies);
+        writer.object([&] { detection(writer, seen, pattern_names, homographies); });
       }
     });
-    text(writer, "reason", to_string(report.reason));
-    text(writer, "state", to_string(report.state));
+    writer.put("reason", to_string(report.reason));
+    writer.put("state", to_string(report.state));
     if (report.scene != nullptr) scene(writer, *report.scene);
     camera(writer, report.camera);
     times(writer, report.ms);
@@ -234,23 +193,23 @@ std::string frame_line(const FrameReport& frame, std::span<const std::string> pa
 }
 
 std::string summary_line(const RunStats& stats) {
-  return json_line([&](JsonText& writer) {
-    object(writer, "summary", [&] {
-      count(writer, "frames", stats.frames());
-      count(writer, "dropped", stats.dropped());
-      count(writer, "skipped", stats.skipped());
-      count(writer, "visible", stats.visible());
-      number(writer, "recognised_percent", stats.recognised_percent());
-      object(writer, "states", [&] {
+  return json_line([&](JsonWriter& writer) {
+    writer.object("summary", [&] {
+      writer.put("frames", stats.frames());
+      writer.put("dropped", stats.dropped());
+      writer.put("skipped", stats.skipped());
+      writer.put("visible", stats.visible());
+      writer.put("recognised_percent", stats.recognised_percent());
+      writer.object("states", [&] {
         for (const Shown state : {Shown::kShown, Shown::kHeld, Shown::kHidden}) {
-          count(writer, to_string(state), stats.count(state));
+          writer.put(to_string(state), stats.count(state));
         }
       });
       reasons(writer, stats);
-      count(writer, "late", stats.late());
-      object(writer, "uploads", [&] {
-        count(writer, "bytes", stats.uploads().bytes);
-        count(writer, "same", stats.uploads().same);
+      writer.put("late", stats.late());
+      writer.object("uploads", [&] {
+        writer.put("bytes", stats.uploads().bytes);
+        writer.put("same", stats.uploads().same);
       });
       if (stats.camera()) camera(writer, *stats.camera());
       times(writer, stats.median_ms());
@@ -259,31 +218,31 @@ std::string summary_line(const RunStats& stats) {
 }
 
 std::string turntable_line(const TurntableReport& report) {
-  return json_line([&](JsonText& writer) {
-    count(writer, "frame", report.frame);
-    text(writer, report.pattern ? "pattern" : "model", report.name);
-    if (!report.clip.empty()) text(writer, "clip", report.clip);
-    number(writer, "angle_deg", report.angle_deg);
-    count(writer, "triangles", report.triangles);
-    count(writer, "draw_calls", static_cast<std::uint64_t>(report.draw_calls));
-    object(writer, "ms", [&] { rounded(writer, "render", report.render_ms); });
+  return json_line([&](JsonWriter& writer) {
+    writer.put("frame", report.frame);
+    writer.put(report.pattern ? "pattern" : "model", report.name);
+    if (!report.clip.empty()) writer.put("clip", report.clip);
+    writer.put("angle_deg", report.angle_deg);
+    writer.put("triangles", report.triangles);
+    writer.put("draw_calls", report.draw_calls);
+    writer.object("ms", [&] { rounded(writer, "render", report.render_ms); });
   });
 }
 
 namespace {
 
 /// Of a log: to three decimals, and 0 where it is not finite.
-void figure(JsonText& writer, const char* key, double value) {
+void figure(JsonWriter& writer, const char* key, double value) {
   rounded(writer, key, std::isfinite(value) ? value : 0);
 }
 
-void times(JsonText& writer, const RunStats& stats) {
+void times(JsonWriter& writer, const RunStats& stats) {
   const StageTimes median = stats.quantile_ms(0.5);
   const StageTimes most = stats.quantile_ms(0.95);
   const StageTimes worst = stats.quantile_ms(1);
-  object(writer, "ms", [&] {
+  writer.object("ms", [&] {
     for (std::size_t i = 0; i < median.size(); ++i) {
-      object(writer, kStageNames[i], [&] {
+      writer.object(kStageNames[i], [&] {
         figure(writer, "median", median[i]);
         figure(writer, "p95", most[i]);
         figure(writer, "max", worst[i]);
@@ -292,15 +251,15 @@ void times(JsonText& writer, const RunStats& stats) {
   });
 }
 
-void memory_of(JsonText& writer, const MemoryByKind& memory) {
-  object(writer, "memory", [&] {
-    count(writer, "resident", memory.resident);
-    count(writer, "heap", memory.heap);
-    count(writer, "bundle", memory.bundle);
-    count(writer, "bundle_resident", memory.bundle_resident);
-    count(writer, "gpu_geometry", memory.gpu_geometry);
-    count(writer, "gpu_textures", memory.gpu_textures);
-    count(writer, "gpu_batches", memory.gpu_batches);
+void memory_of(JsonWriter& writer, const MemoryByKind& memory) {
+  writer.object("memory", [&] {
+    writer.put("resident", memory.resident);
+    writer.put("heap", memory.heap);
+    writer.put("bundle", memory.bundle);
+    writer.put("bundle_resident", memory.bundle_resident);
+    writer.put("gpu_geometry", memory.gpu_geometry);
+    writer.put("gpu_textures", memory.gpu_textures);
+    writer.put("gpu_batches", memory.gpu_batches);
   });
 }
 
@@ -341,16 +300,16 @@ MemoryByKind measure_memory(std::span<const std::byte> mapped) {
 Result<QosLog> QosLog::create(const std::string& path, const QosHead& head, double every_s) {
   MODAR_ASSIGN(AtomicFile file, AtomicFile::create(path));
   QosLog log(std::move(file), every_s);
-  MODAR_TRY(log.write(json_line([&](JsonText& writer) {
-    object(writer, "qos", [&] {
-      count(writer, "version", 1);
-      text(writer, "bundle", head.bundle);
-      text(writer, "input", head.input);
-      text(writer, "method", head.method);
-      text(writer, "parameters", head.parameters);
-      text(writer, "gl_renderer", head.gl_renderer);
-      text(writer, "gl_version", head.gl_version);
-      text(writer, "device", head.device);
+  MODAR_TRY(log.write(json_line([&](JsonWriter& writer) {
+    writer.object("qos", [&] {
+      writer.put("version", 1);
+      writer.put("bundle", head.bundle);
+      writer.put("input", head.input);
+      writer.put("method", head.method);
+      writer.put("parameters", head.parameters);
+      writer.put("gl_renderer", head.gl_renderer);
+      writer.put("gl_version", head.gl_version);
+      writer.put("device", head.device);
       figure(writer, "budget_ms", kFrameBudgetMs);
     });
   })));
@@ -371,16 +330,16 @@ Result<void> QosLog::add(const FrameReport& report, std::span<const std::string>
       if (each.pattern == pattern) detection = &each;
     }
     if (seen_[pattern] == (detection != nullptr)) continue;
-    const std::string line = json_line([&](JsonText& writer) {
-      text(writer, "event", detection != nullptr ? "found" : "lost");
-      text(writer, "pattern", pattern_names[pattern]);
-      count(writer, "frame", report.frame);
+    const std::string line = json_line([&](JsonWriter& writer) {
+      writer.put("event", detection != nullptr ? "found" : "lost");
+      writer.put("pattern", pattern_names[pattern]);
+      writer.put("frame", report.frame);
       figure(writer, "time_s", report.time_s);
       figure(writer, "after_s", report.time_s - since_s_[pattern]);
       if (detection != nullptr) {
-        count(writer, "inliers", static_cast<std::uint64_t>(detection->inliers));
+        writer.put("inliers", detection->inliers);
       } else {
-        text(writer, "reason", to_string(report.reason));
+        writer.put("reason", to_string(report.reason));
       }
     });
     seen_[pattern] = detection != nullptr;
@@ -392,14 +351,14 @@ Result<void> QosLog::add(const FrameReport& report, std::span<const std::string>
 }
 
 Result<void> QosLog::window(const MemoryByKind& memory) {
-  const std::string line = json_line([&](JsonText& writer) {
-    object(writer, "second", [&] {
+  const std::string line = json_line([&](JsonWriter& writer) {
+    writer.object("second", [&] {
       figure(writer, "from_s", window_start_s_);
-      count(writer, "frames", window_.frames());
-      count(writer, "visible", window_.visible());
-      count(writer, "held", window_.count(Shown::kHeld));
-      count(writer, "hidden", window_.count(Shown::kHidden));
-      count(writer, "late", window_.late());
+      writer.put("frames", window_.frames());
+      writer.put("visible", window_.visible());
+      writer.put("held", window_.count(Shown::kHeld));
+      writer.put("hidden", window_.count(Shown::kHidden));
+      writer.put("late", window_.late());
       reasons(writer, window_);
       times(writer, window_);
       memory_of(writer, memory);

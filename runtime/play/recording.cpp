@@ -2,41 +2,33 @@
 #include "recording.hpp"
 
 #include "formats/base/atomic_file.hpp"
+#include "formats/json_writer.hpp"
 #include "frame_sink.hpp"
-#include "json_text.hpp"
 
 namespace modar {
 namespace {
 
 std::string head_line(const RecordingHead& head) {
-  JsonText writer;
-  writer.open('{');
-  writer.key("recording");
-  writer.open('{');
-  writer.key("version");
-  writer.count(1);
-  writer.key("method");
-  writer.text(head.method);
-  writer.key("parameters");
-  writer.text(head.parameters);
-  writer.key("fps");
-  writer.number(head.fps);
-  writer.key("stills");
-  writer.flag(head.stills);
-  // A string: JSON's numbers end at 2^53 for most readers.
-  writer.key("bundle_hash");
-  writer.text(std::to_string(head.bundle_hash));
-  writer.key("camera");
-  writer.open('[');
-  const Camera& c = head.camera;
-  for (const double value :
-       {static_cast<double>(c.width), static_cast<double>(c.height), c.fx, c.fy, c.cx, c.cy,
-        c.distortion[0], c.distortion[1], c.distortion[2], c.distortion[3], c.distortion[4]}) {
-    writer.number(value);
-  }
-  writer.close(']');
-  writer.close('}');
-  writer.close('}');
+  JsonWriter writer;
+  const auto camera = [&] {
+    const Camera& c = head.camera;
+    writer.add(c.width);
+    writer.add(c.height);
+    for (const double value : {c.fx, c.fy, c.cx, c.cy}) writer.add(value);
+    for (const double value : c.distortion) writer.add(value);
+  };
+  writer.object([&] {
+    writer.object("recording", [&] {
+      writer.put("version", 1);
+      writer.put("method", head.method);
+      writer.put("parameters", head.parameters);
+      writer.put("fps", head.fps);
+      writer.put("stills", head.stills);
+      // A string: JSON's numbers end at 2^53 for most readers.
+      writer.put("bundle_hash", std::to_string(head.bundle_hash));
+      writer.array("camera", camera);
+    });
+  });
   return writer.str();
 }
 
