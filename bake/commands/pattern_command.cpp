@@ -35,12 +35,16 @@ struct RectifyCommand {
   bool json = false;
 };
 
-struct ScoreCommand {
+/// A measurement of each of some pictures.
+struct PicturesCommand {
   std::vector<std::string> patterns;  ///< image files
-  std::string overlay_folder;         ///< empty: none
+  std::string picture_folder;         ///< with the measurement drawn; empty: none
   std::string shape;                  ///< of parse_shape(); empty: flat
-  unsigned jobs = 1;                  ///< threads; the scores do not depend on it
   bool json = false;
+};
+
+struct ScoreCommand : PicturesCommand {
+  unsigned jobs = 1;  ///< threads; the scores do not depend on it
 };
 
 struct NamedScore {
@@ -57,16 +61,12 @@ struct ConfusionCommand {
   bool json = false;
 };
 
-struct SimulateCommand {
-  std::vector<std::string> patterns;  ///< image files
-  std::string camera_file;            ///< empty: the default camera
-  std::string backgrounds;            ///< folder; empty: made ones
-  std::string picture_folder;         ///< of contact sheets; empty: none
-  std::string shape;                  ///< of parse_shape(); empty: flat
-  std::string width;                  ///< with a unit
+struct SimulateCommand : PicturesCommand {
+  std::string camera_file;  ///< empty: the default camera
+  std::string backgrounds;  ///< folder; empty: made ones
+  std::string width;        ///< with a unit
   SimulateOptions options;
   bool quiet = false;
-  bool json = false;
 };
 
 unsigned cores() {
@@ -90,7 +90,6 @@ Json corners_json(const std::array<PixelPoint, 4>& corners) {
   });
 }
 
-/// The corners of --corners, or those that are found, shown in a picture.
 Result<void> take_length(const char* option, const std::string& text, double& mm) {
   if (text.empty()) return {};
   const auto length = parse_millimetres(text);
@@ -102,6 +101,7 @@ Result<void> take_length(const char* option, const std::string& text, double& mm
   return {};
 }
 
+/// The corners of --corners, or those that are found, shown in a picture.
 Result<void> take_corners(RectifyCommand& command, const RgbaImage& photo) {
   if (!command.corners.empty()) {
     MODAR_ASSIGN(command.options.corners, parse_corners(command.corners));
@@ -262,45 +262,51 @@ void print_failure(const Error& error, ExitCode& answer) {
   if (answer == ExitCode::kOk) answer = error.exit;
 }
 
-Result<NamedScore> score_named(const ScoreCommand& command, const std::string& path) {
-  MODAR_ASSIGN(const ShapeRequest shape, shape_of(path, command.shape));
-  MODAR_ASSIGN(ScoredPicture scored, score_file(path, 0, shape, command.jobs));
-  if (!command.overlay_folder.empty()) {
-    MODAR_ASSIGN(const std::string out, picture_of(path, command.overlay_folder));
-    MODAR_TRY(write_png(score_overlay(scored.shaped.picture.view(), scored.score), out));
-  }
-  return NamedScore{file_stem(path), std::move(scored.score), scored.shaped.width_mm};
-}
-
-Result<ExitCode> run_score(ScoreCommand& command) {
+/// Measures each picture, and prints it as text, or all as JSON.
+template <class Measure, class Print, class Make>
+Result<ExitCode> measure_each(PicturesCommand& command, const Measure& measure, const Print& print,
+                              const Make& json_of) {
   MODAR_TRY(open_folders(command.patterns));
-  if (!command.overlay_folder.empty()) {
-    MODAR_TRY(make_output_folder(command.overlay_folder));
+  if (!command.picture_folder.empty()) {
+    MODAR_TRY(make_output_folder(command.picture_folder));
     for (const std::string& path : command.patterns) {
-      MODAR_TRY(picture_of(path, command.overlay_folder));
+      MODAR_TRY(picture_of(path, command.picture_folder));
     }
   }
   ExitCode answer = ExitCode::kOk;
   Json list = Json::array();
   for (const std::string& path : command.patterns) {
-    const auto one = score_named(command, path);
+    const auto one = measure(path);
     if (!one) {
       print_failure(one.error(), answer);
       list.push_back(failure_json(path, one.error()));
       continue;
     }
-    list.push_back(score_json(*one));
-    if (command.json) continue;
-    std::printf("%s: %c: %s; %d of 100 (version %u)\n", one->name.c_str(), one->score.grade,
-                range_sentence(one->score.range, one->width_mm).c_str(), one->score.score,
-                kScoreVersion);
-    for (const ScoreCause& cause : one->score.causes) {
-      std::printf("  %-10s %3d%s%s\n", cause.id, cause.value, *cause.advice != 0 ? "  " : "",
-                  cause.advice);
-    }
+    if (!command.json) print(*one);
+    list.push_back(json_of(*one));
   }
   if (command.json) std::fputs(list.dump().c_str(), stdout);
   return answer;
+}
+
+Result<NamedScore> score_named(const ScoreCommand& command, const std::string& path) {
+  MODAR_ASSIGN(const ShapeRequest shape, shape_of(path, command.shape));
+  MODAR_ASSIGN(ScoredPicture scored, score_file(path, 0, shape, command.jobs));
+  if (!command.picture_folder.empty()) {
+    MODAR_ASSIGN(const std::string out, picture_of(path, command.picture_folder));
+    MODAR_TRY(write_png(score_overlay(scored.shaped.picture.view(), scored.score), out));
+  }
+  return NamedScore{file_stem(path), std::move(scored.score), scored.shaped.width_mm};
+}
+
+void print_score(const NamedScore& one) {
+  std::printf("%s: %c: %s; %d of 100 (version %u)\n", one.name.c_str(), one.score.grade,
+              range_sentence(one.score.range, one.width_mm).c_str(), one.score.score,
+              kScoreVersion);
+  for (const ScoreCause& cause : one.score.causes) {
+    std::printf("  %-10s %3d%s%s\n", cause.id, cause.value, *cause.advice != 0 ? "  " : "",
+                cause.advice);
+  }
 }
 
 void add_score(CommandLine& pattern) {
@@ -310,7 +316,7 @@ void add_score(CommandLine& pattern) {
   command->jobs = cores();
   line.option("patterns", &command->patterns, "Pattern pictures, or folders of them",
               {.type = "IMAGE|DIR...", .required = true});
-  line.option("--overlay", &command->overlay_folder,
+  line.option("--overlay", &command->picture_folder,
               "Write NAME.png for each: robust features (green), weak features (orange), areas "
               "without features (dark)",
               {.type = "DIR"});
@@ -320,7 +326,10 @@ void add_score(CommandLine& pattern) {
               {.least = 1, .most = 256});
   line.flag("--json", command->json, "Print as JSON");
   line.footer(example("  modar pattern score cover.png --overlay overlays\n"));
-  line.run([command] { return run_score(*command); });
+  line.run([command] {
+    const auto score = [&](const std::string& path) { return score_named(*command, path); };
+    return measure_each(*command, score, print_score, score_json);
+  });
 }
 
 Json value_json(const SimulatedValue& value) {
@@ -369,14 +378,10 @@ void print_simulation(const Simulation& simulation) {
 /// Options that are files, read.
 Result<void> complete(SimulateCommand& command) {
   if (!command.camera_file.empty()) {
-    const auto camera = read_camera_file(command.camera_file);
-    if (!camera) return tl::unexpected(camera.error());
-    command.options.camera = *camera;
+    MODAR_ASSIGN(command.options.camera, read_camera_file(command.camera_file));
   }
   if (!command.backgrounds.empty()) {
-    auto photos = pictures_of(command.backgrounds);
-    if (!photos) return tl::unexpected(photos.error());
-    command.options.backgrounds = std::move(*photos);
+    MODAR_ASSIGN(command.options.backgrounds, pictures_of(command.backgrounds));
   }
   return {};
 }
@@ -396,30 +401,14 @@ Result<Simulation> simulate_file(SimulateCommand& command, const std::string& pa
 
 Result<ExitCode> run_simulate(SimulateCommand& command) {
   MODAR_TRY(take_length("--width", command.width, command.options.width_mm));
-  MODAR_TRY(open_folders(command.patterns));
   MODAR_TRY(complete(command));
-  if (!command.picture_folder.empty()) {
-    MODAR_TRY(make_output_folder(command.picture_folder));
-    for (const std::string& path : command.patterns) {
-      MODAR_TRY(picture_of(path, command.picture_folder));
-    }
-  }
   ProgressBar bar(command.quiet);
-  ExitCode answer = ExitCode::kOk;
-  Json list = Json::array();
-  for (const std::string& path : command.patterns) {
-    const auto simulation = simulate_file(command, path, bar);
+  const auto simulated = [&](const std::string& path) {
+    auto simulation = simulate_file(command, path, bar);
     bar.clear();
-    if (!simulation) {
-      print_failure(simulation.error(), answer);
-      list.push_back(failure_json(path, simulation.error()));
-      continue;
-    }
-    if (!command.json) print_simulation(*simulation);
-    list.push_back(simulation_json(*simulation));
-  }
-  if (command.json) std::fputs(list.dump().c_str(), stdout);
-  return answer;
+    return simulation;
+  };
+  return measure_each(command, simulated, print_simulation, simulation_json);
 }
 
 void add_simulate(CommandLine& pattern) {
