@@ -325,9 +325,4 @@ std::optional<std::vector<std::uint8_t>> PictureDecoder::finish() {
   return std::move(pixels_);
 }
 
-std::optional<std::vector<std::uint8_t>> decode_picture(std::span<const std::byte> coded,
-                                                        std::uint32_t width, std::uint32_t height) {
-  return PictureDecoder(coded, width, height).finish();
-}
-
 }  // namespace modar

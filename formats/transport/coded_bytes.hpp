@@ -23,11 +23,9 @@ std::optional<std::vector<std::byte>> decode_bytes(std::span<const std::byte> co
 
 /// Of a gray picture without padding, of width x height pixels.
 std::vector<std::byte> encode_picture(std::span<const std::uint8_t> pixels, std::uint32_t width);
-std::optional<std::vector<std::uint8_t>> decode_picture(std::span<const std::byte> coded,
-                                                        std::uint32_t width, std::uint32_t height);
 
-/// decode_picture() while the coded bytes come: on a slow line nothing is left to do when the last
-/// one is there.
+/// Decodes while the coded bytes come: on a slow line nothing is left to do when the last one is
+/// there.
 class PictureDecoder {
  public:
   /// coded: memory for all of the bytes, which outlives this.

@@ -111,9 +111,9 @@ TEST(CodedPicture, ComesBackAndIsSmallerThanItsNoise) {
   for (const auto& [width, height] : {std::pair{1, 1}, {1, 40}, {40, 1}, {200, 150}}) {
     const GrayPicture picture = discs(width, height);
     const Bytes coded = encode_picture(picture.pixels, static_cast<std::uint32_t>(width));
-    EXPECT_EQ(decode_picture(coded, static_cast<std::uint32_t>(width),
-                             static_cast<std::uint32_t>(height)),
-              picture.pixels);
+    PictureDecoder decoder(coded, static_cast<std::uint32_t>(width),
+                           static_cast<std::uint32_t>(height));
+    EXPECT_EQ(decoder.finish(), picture.pixels);
   }
   // A gradient with three equally likely grays of noise: log2(3) bits a pixel are its least.
   GrayPicture noisy{256, 256, {}};

@@ -12,8 +12,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "bake/export/model_file.hpp"
 #include "bake/image/difference.hpp"
-#include "bake/mesh/pack/vertex_codec.hpp"
 #include "bake/mesh/rays/triangle_tree.hpp"
 #include "bake/texture/texture_codec.hpp"
 #include "formats/tracker_record.hpp"
@@ -40,27 +40,19 @@ struct BundleSurface {
 
 BundleSurface surface_of(const BundleView& bundle, const ModelRecord& model) {
   BundleSurface surface;
-  const VertexDecoder decoder(bundle.layouts()[model.layout]);
   const glm::dvec3 center(model.center[0], model.center[1], model.center[2]);
   for (std::uint32_t c = 0; c < model.chunk_count; ++c) {
     const ChunkRecord& chunk = bundle.chunks()[model.first_chunk + c];
-    const LevelRecord& level = bundle.levels()[chunk.first_level];
-    // Chunks may share vertices: each decodes its own.
-    std::vector<std::uint32_t> numbers(level.vertex_count, kNone);
-    const auto number_of = [&](std::uint16_t v) {
-      if (numbers[v] != kNone) return numbers[v];
-      const std::byte* vertex =
-          bundle.vertices().data() + level.vertex_offset + std::size_t{v} * decoder.stride();
-      numbers[v] = static_cast<std::uint32_t>(surface.positions.size());
-      surface.positions.push_back(center + model.scale * decoder.position(vertex, chunk));
-      if (decoder.has(Semantic::kColour)) surface.colours.push_back(decoder.colour(vertex));
-      return numbers[v];
-    };
-    const auto* indices =
-        reinterpret_cast<const std::uint16_t*>(bundle.indices().data() + level.index_offset);
-    for (std::uint32_t i = 0; i < level.index_count; i += 3) {
-      surface.triangles.push_back(
-          {number_of(indices[i]), number_of(indices[i + 1]), number_of(indices[i + 2])});
+    const auto level = decode_level(bundle, bundle.layouts()[model.layout], chunk);
+    if (!level) continue;  // its bytes are judged before
+    const auto first = static_cast<std::uint32_t>(surface.positions.size());
+    for (const glm::dvec3& position : level->positions) {
+      surface.positions.push_back(center + model.scale * position);
+    }
+    surface.colours.insert(surface.colours.end(), level->colours.begin(), level->colours.end());
+    const auto& at = level->indices;
+    for (std::size_t i = 0; i + 2 < at.size(); i += 3) {
+      surface.triangles.push_back({first + at[i], first + at[i + 1], first + at[i + 2]});
     }
   }
   return surface;
