@@ -8,6 +8,7 @@
 #include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/mesh/lod/reduce.hpp"
 #include "bake/mesh/rays/occlusion.hpp"
+#include "bake/mesh/repair/repair.hpp"
 #include "bake/mesh/upright.hpp"
 #include "tests/fuzz/made_model.hpp"
 #include "tests/mesh/stages.hpp"

@@ -33,7 +33,7 @@ class TopologyReader {
     const std::span<const std::uint32_t> corners = around_.at(v);
     ++sums_.vertices;
     fans_.read(surface_, corners);
-    rims_.assign(corners.size(), kNone);
+    rims_.assign(corners.size(), repair::kNone);
     bool crowded = false;
     for (std::size_t i = 0, end = 0; i < fans_.spokes.size(); i = end) {
       const Fans::Spoke& spoke = fans_.spokes[i];
@@ -42,7 +42,7 @@ class TopologyReader {
       crowded = crowded || triangles > 2;
       if (triangles == 1) {
         std::uint32_t& rim = rims_[fans_.sets.root(spoke.number)];
-        if (rim == kNone) rim = spoke.half_edge;
+        if (rim == repair::kNone) rim = spoke.half_edge;
         loops_.join(rim, spoke.half_edge);
       }
       if (spoke.neighbour > v) count_edge(std::span(fans_.spokes).subspan(i, triangles));
