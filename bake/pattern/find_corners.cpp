@@ -73,10 +73,10 @@ constexpr double kFourSided = 0.85;
 // Area, relative to the foreground's, of another object that makes it doubtful.
 constexpr double kLeastRival = 0.4;
 // Shares of the photo that an object of any shape on a background has.
-constexpr double kLeastObject = 0.05;
+constexpr double kLeastObject = 0.03;
 constexpr double kMostObject = 0.9;
-// Share of its hull that it fills. Lower: pictures of any content are doubted. [0.9, 0.97]
-constexpr double kSolid = 0.93;
+// Share of its hull that it fills. Lower: pictures of any content are doubted. [0.88, 0.95]
+constexpr double kSolid = 0.9;
 // Area of the next object, relative to it, at most. Higher: as above. [0.05, 0.2]
 constexpr double kAlone = 0.1;
 // From a side to the places that are compared, times the figure's size.

@@ -70,6 +70,12 @@ TrackStep with_gray_of_rgb(TrackStep track) {
 
 /// Plays the bundle's scenes over the frames of --input or --golden; answers the exit code.
 Result<int> play_video(const PlayOptions& asked, const BundleView& bundle, const MappedFile& file) {
+  // In a window, a pattern can be captured.
+  if (bundle.patterns().empty() && !asked.window && !asked.live) {
+    return fail(ExitCode::kInvalidInput, "play.no-pattern", asked.bundle,
+                "it has no pattern that a camera could find",
+                "bake it with --pattern, or look at its models with --turntable 24 --out FOLDER");
+  }
   MODAR_ASSIGN(Plan plan, make_plan(asked, bundle));
   PlayOptions options = asked;
   options.method = choose_method(bundle, plan.method, plan.parameters);

@@ -98,6 +98,11 @@ Result<void> Player::open(const PlayerSetup& setup) {
   if (is_bare(bundle_) && !options_.quiet) {
     std::fputs("modar-play: no pattern of the bundle has content; outlines are drawn\n", stderr);
   }
+  const bool kept = !options_.out.empty() || !options_.report.empty() || !options_.record.empty() ||
+                    !options_.qos.empty() || !options_.golden.empty();
+  if (!kept && !options_.window && !options_.json && !options_.quiet) {
+    std::fputs("modar-play: no picture is kept; --out, --report or --window shows them\n", stderr);
+  }
   MODAR_ASSIGN(auto screen, Screen::open(bundle_, options_));
   screen_ = std::move(screen);
   open_media();
@@ -453,9 +458,9 @@ std::string Player::summary_text() const {
   char text[200];
   std::snprintf(
       text, sizeof text,
-      "%llu frames, a pattern seen in %llu (%.1f %%), held in %llu; median ms: track "
+      "%llu %s, a pattern seen in %llu (%.1f %%), held in %llu; median ms: track "
       "%.1f, render %.1f%s%s",
-      static_cast<unsigned long long>(stats_.frames()),
+      static_cast<unsigned long long>(stats_.frames()), stats_.frames() == 1 ? "frame" : "frames",
       static_cast<unsigned long long>(stats_.visible()), stats_.recognised_percent(),
       static_cast<unsigned long long>(stats_.count(Shown::kHeld)),
       ms[static_cast<std::size_t>(Stage::kTrack)], ms[static_cast<std::size_t>(Stage::kRender)],

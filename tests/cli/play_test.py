@@ -54,6 +54,10 @@ class Play(ProgramTest):
         self.assert_fails(self.play(bundle, "--input", COVER, "--device", "x"), 1, "mali400")
         self.assert_fails(self.play(bundle, "--input", COVER, "--window", env={"SDL_VIDEODRIVER": "none"}), 5,
                           "--window")
+        self.assertIn("no picture is kept; --out, --report or --window", self.play(bundle, "--input", COVER).stderr)
+        (self.folder / "bare.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        self.modar("bake", "bare.obj", "-o", "bare.modar")
+        self.assert_fails(self.play("bare.modar", "--input", COVER), 3, "it has no pattern that a camera could find; bake it with --pattern")
         if os.path.exists("/dev/full"):
             with open("/dev/full", "w") as full:
                 done = subprocess.run([BIN / "modar-play", bundle, "--input", COVER, "--json"], stdout=full,
