@@ -868,7 +868,7 @@ import('./qr.js').then(({drawQr}) => drawQr(this.#$('qr'), location.href)).catch
   /** @param {Frame} frame */
   #onFrame(frame) {
     if (!this.#camera.stream) return;
-    if (this.#state === 'looking' && frame.reason === 'visible') performance.mark('modar: tracked');
+    if (this.#state !== 'seen' && frame.reason === 'visible') performance.mark('modar: tracked');
     try {
       this.#view.draw(frame, {mirror: this.#camera.mirrored});
     } catch (error) {
