@@ -5,7 +5,7 @@ import struct
 import sys
 import unittest
 
-from programs import COVER, QUICK, ROOT, ProgramTest
+from programs import COVER, QUICK, ROOT, ProgramTest, picture
 
 
 def png_size(path):
@@ -13,8 +13,13 @@ def png_size(path):
 
 
 class Rectify(ProgramTest):
-    def rectify(self, corners, *more):
-        return self.modar("pattern", "rectify", COVER, "--corners", corners, "-o", self.folder / "out.png", *more)
+    def rectify(self, corners, *more, photo=COVER):
+        return self.modar("pattern", "rectify", photo, "--corners", corners, "-o", self.folder / "out.png", *more)
+
+    def whole_photo(self):
+        """Of a shape that cameras make: the cover's says that it is cropped."""
+        picture(self.folder / "whole.png", 510, 680)
+        return "whole.png"
 
     def test_a_given_size_gives_the_aspect_ratio(self):
         done = self.rectify("10,10,300,40,310,600,20,650", "--width", "200mm", "--height", "300mm")
@@ -23,11 +28,12 @@ class Rectify(ProgramTest):
         self.assertAlmostEqual(width / height, 2 / 3, delta=0.01)
 
     def test_an_aspect_that_is_not_well_known_is_told(self):
-        frontal = self.rectify("40,30,300,30,300,600,40,600", "--json")
+        frontal = self.rectify("40,30,300,30,300,600,40,600", "--json", photo=self.whole_photo())
         self.assertEqual(frontal.returncode, 0, frontal.stderr)
         self.assertAlmostEqual(json.loads(frontal.stdout)["aspect"], 260 / 570, delta=0.01)
         self.assertRegex(frontal.stderr, r"width by height 0\.45\d \+- 0\.0")
         self.assertNotIn("rectify.aspect", frontal.stderr)
+        self.assertIn("rectify.aspect", self.rectify("40,30,300,30,300,600,40,600").stderr)
         tilted = self.rectify("10,10,300,160,310,500,20,650", "--width", "200mm")
         self.assertEqual(tilted.returncode, 0, tilted.stderr)
         self.assertRegex(tilted.stderr, r"rectify\.aspect")
@@ -37,8 +43,9 @@ class Rectify(ProgramTest):
 
     def test_sizes_that_the_photo_contradicts_are_doubted(self):
         frontal = "40,30,300,30,300,600,40,600"  # 260 to 570
+        photo = self.whole_photo()
         for height, doubted in (("210mm", True), ("438mm", False), ("360mm", False), ("330mm", True)):
-            done = self.rectify(frontal, "--width", "200mm", "--height", height)
+            done = self.rectify(frontal, "--width", "200mm", "--height", height, photo=photo)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual("rectify.sizes" in done.stderr, doubted, f"{height}: {done.stderr}")
 
