@@ -459,7 +459,7 @@ class BadInput(ProgramTest):
     def test_a_file_that_is_not_there(self):
         self.assert_fails(self.bake("--model", "none.obj"), 2, "none.obj")
         self.assert_fails(self.bake("--pattern", "none.png"), 2, "none.png")
-        self.assert_fails(self.bake("none.obj", "none.obj"), 2, "none.png")
+        self.assert_fails(self.bake("none.obj", "none.png"), 2, "none.obj")
         self.assert_nothing_written()
 
     def test_a_file_that_is_something_else(self):
