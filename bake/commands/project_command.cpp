@@ -153,8 +153,8 @@ void print_outcome(const ProjectOutcome& outcome, bool explain, bool dry_run, bo
                        : bundle.written ? "written"
                        : dry_run        ? "to write"
                                         : "not written";
-    std::fprintf(stderr, "%s: %s, %s\n", bundle.path.c_str(), human_bytes(bundle.bytes).c_str(),
-                 what);
+    const std::string size = bundle.bytes == 0 ? "" : human_bytes(bundle.bytes) + ", ";
+    std::fprintf(stderr, "%s: %s%s\n", bundle.path.c_str(), size.c_str(), what);
     const auto file = bundle.written ? MappedFile::open(bundle.path) : Result<MappedFile>();
     if (!file) continue;
     if (const auto view = BundleView::open(file->bytes())) print_scenes(*view);

@@ -109,11 +109,11 @@ Outcome Attempts::classify(Transfer& transfer, const Answer& answer) {
       transfer.error = answer.error;
       return Outcome::kFailed;
     case Answer::Kind::kMissing:
-      if (++transfer.missing < kMissingAttempts && !transfer.optional) {
+      if (is_server_ && ++transfer.missing < kMissingAttempts && !transfer.optional) {
         return again(transfer, "the server has no such file");
       }
       transfer.error = {kExitMixed, "fetch.missing", address_of(transfer),
-                        "the server has no such file",
+                        is_server_ ? "the server has no such file" : "the folder has no such file",
                         transfer.object == nullptr ? "check the address, or publish a release there"
                                                    : "publish the release again, whole"};
       return Outcome::kFailed;

@@ -59,9 +59,9 @@ enum class Outcome { kDone, kAgain, kFailed };
 /// Receives transfers and decides about further attempts.
 class Attempts {
  public:
-  /// address: of the release folder, for messages.
-  Attempts(const TransferOptions& options, std::string address)
-      : options_(options), address_(std::move(address)) {}
+  /// address: of the release folder, for messages. is_server: missing files may come soon.
+  Attempts(const TransferOptions& options, std::string address, bool is_server = true)
+      : options_(options), address_(std::move(address)), is_server_(is_server) {}
 
   /// Receives progress in bytes, negative for discarded ones; may be empty.
   void report_progress(std::function<void(std::int64_t)> on_bytes) {
@@ -94,6 +94,7 @@ class Attempts {
 
   TransferOptions options_;
   std::string address_;
+  bool is_server_;
   TransferStats stats_;
   std::function<void(std::int64_t)> on_bytes_;
 };

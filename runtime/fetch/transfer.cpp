@@ -58,7 +58,7 @@ Result<Transfers> Transfers::create(const TransferOptions& options) {
                   "give http://HOST/PATH or a folder that `modar ship publish` filled");
     }
     return Transfers(std::make_unique<State>(
-        State{Attempts(options, *folder),
+        State{Attempts(options, *folder, false),
               make_source_downloader(folder_source(*folder, options.bytes_per_second)),
               {}}));
   }

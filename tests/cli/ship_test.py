@@ -662,7 +662,9 @@ class Refusals(ShipTest):
         for piece in (self.site / "objects").rglob("*"):
             if piece.is_file():
                 piece.unlink()
-        self.assert_fails(self.fetch(), 13, "fetch.missing")
+        done = self.fetch()
+        self.assert_fails(done, 13, "fetch.missing", "the folder has no such file")
+        self.assertNotIn("attempt", done.stderr)
 
     def test_status_for_operators(self):
         status = self.folder / "status.json"
