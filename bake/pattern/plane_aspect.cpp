@@ -128,7 +128,7 @@ Weighed weigh(const Sides& sides, const std::vector<Sides>& moved, double focal,
           here.log_aspect - both / cosines * here.cosine, aspects - both * both / cosines};
 }
 
-/// Knowledge of a photo's focal length and centre.
+/// Prior information about a photo, apart from its corners.
 struct Known {
   double exif = 0;    ///< focal length, of the longer side; or 0
   double likely = 1;  ///< of the centre

@@ -297,6 +297,8 @@ class Check(ProgramTest):
         self.assertNotIn("p=sheet: nothing", done.stderr)
         said = self.check(0, "o.modar")
         self.assertIn("warning MODEL_UNSEEN model 'down'", said)
+        self.assertEqual(self.modar("report", "o.modar", "-o", "o.html", "--quiet").returncode, 0)
+        self.assertEqual((self.folder / "o.html").read_text(encoding="utf-8").count("MODEL_UNSEEN"), said.count("MODEL_UNSEEN"))
         self.assertNotIn("model 'sheet'", said)
 
     def test_rough_models_are_looked_at_in_many_samples(self):

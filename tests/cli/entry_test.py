@@ -18,10 +18,10 @@ CORNERS = [(120, 60), (330, 90), (310, 260), (90, 230)]
 STL = "solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid x\n"
 
 
-def photo(path):
+def photo(path, height=320, corners=tuple(CORNERS)):
     """A card on a table."""
-    canvas = Canvas(420, 320, (190, 180, 160), 2)
-    canvas.polygon(CORNERS, (40, 60, 120))
+    canvas = Canvas(420, height, (190, 180, 160), 2)
+    canvas.polygon(corners, (40, 60, 120))
     for x, y, side in ((180, 130, 50), (140, 100, 30), (250, 180, 40), (260, 110, 24), (130, 190, 28)):
         canvas.box(x, y, x + side, y + side, (220, 200, 40))
     png.write(path, canvas.picture(), 6)
@@ -87,6 +87,12 @@ class SameFiles(ProgramTest):
             self.assertEqual("corners 1" in done.stderr, not shape, done.stderr)
             bands.append(json.loads(done.stdout)[0]["bands"] if command == "simulate" else None)
         self.assertNotEqual(bands[1], bands[2])
+
+    def test_a_cropped_photo_leaves_the_shape_in_doubt(self):
+        for height, cropped in ((315, False), (300, True)):  # 4:3, as cameras make them, and another
+            photo(self.place / "card.png", height, [(80, 40), (340, 100), (340, 220), (80, 280)])
+            done = self.modar("bake", "card.png", "-o", "a.modar", *QUICK, cwd=self.place)
+            self.assertEqual((done.returncode, "pattern.shape" in done.stderr), (0, cropped), done.stderr)
 
     def test_a_print_from_straight_above_is_doubted(self):
         for size, words in (((640, 480), True), ((640, 440), False)):  # the shape of a camera's photos, and another
@@ -201,6 +207,11 @@ class WrongFiles(ProgramTest):
     def test_what_is_missing_is_named_before_options(self):
         for words in (("missing.glb",), ("../nofolder",), (COVER, "missing.png")):
             self.assert_fails(self.modar("bake", *words), 2, words[-1], "the file cannot be opened or read")
+
+    def test_widths_that_no_print_has_are_doubted(self):
+        for width, doubted in (("4.9mm", True), ("5mm", False), ("20m", False), ("20.1m", True)):
+            done = self.modar("bake", f"{COVER}:{width}", "-o", "w.modar", *QUICK)
+            self.assertEqual((done.returncode, "pattern.width" in done.stderr), (0, doubted), done.stderr)
 
     def test_a_first_version_of_gltf_is_called_so(self):
         (self.folder / "old.gltf").write_text('{"nodes": {"a": {"meshes": ["m"]}}, "meshes": {"m": {}}}')

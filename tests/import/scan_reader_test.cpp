@@ -206,6 +206,26 @@ TEST(Ply, TextAndBothByteOrdersAreTheSame) {
   }
 }
 
+// Blender's exporters of PLY write Z up unless the person says otherwise, in which case a comment
+// that names the axis decides.
+TEST(Ply, FilesOfBlenderStandUpright) {
+  const std::pair<const char*, UpAxis> cases[] = {
+      {"Created by Blender 3.4.1 - www.blender.org", UpAxis::kZ},
+      {"Created in Blender version 4.0.0", UpAxis::kZ},
+      {"Created by Blender 3.4.1\ncomment Y up", UpAxis::kY},
+      {"Created by another program", UpAxis::kY}};
+  for (const auto& [comment, up] : cases) {
+    const auto model = parse_ply(std::string("ply\nformat ascii 1.0\ncomment ") + comment +
+                                     "\nelement vertex 3\nproperty float x\nproperty float y\n"
+                                     "property float z\nelement face 1\n"
+                                     "property list uchar int vertex_index\nend_header\n"
+                                     "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+                                 "a.ply");
+    ASSERT_TRUE(model) << to_line(model.error());
+    EXPECT_EQ(model->up.axis, up) << comment;
+  }
+}
+
 TEST(Ply, CornersWithUvsOfTheirOwnAndStrips) {
   const auto corners = parse_ply(
       "ply\nformat ascii 1.0\ncomment TextureFile stone wall.png\nelement vertex 3\n"

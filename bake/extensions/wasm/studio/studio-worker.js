@@ -407,7 +407,7 @@ async function beginJob(data) {
 
 /** @param {{program: WebAssembly.Module, chosen: {name: string, folder?: FileSystemDirectoryHandle}}} begin */
 async function beginPage({program, chosen}) {
-  folder = `/work/${chosen.name}`;
+  folder = `/projects/${chosen.name}`;
   await start(program);
   await openDisk(chosen);
   modar.ccall('studio_open', null, ['string', 'number'], [folder, 0]);
