@@ -1,21 +1,17 @@
 """The static studio and the library's example in each browser that is installed: load, bake, stage. The page drives itself, with files of
 its server, and posts what it found; the bundles are the native program's."""
-import functools
 import hashlib
 import json
-import os
 import pathlib
 import shutil
 import subprocess
 import sys
 import tempfile
-import threading
-import http.server
 import unittest
 
 TESTS = pathlib.Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS / "cli"), str(TESTS / "web")]
-from browser import Quiet, engines  # noqa: E402
+from browser import engines, report_of  # noqa: E402
 from programs import BIN, ROOT  # noqa: E402
 
 FILES = ("patterns/cover.png", "models/pottery.obj", "models/pottery.mtl", "models/pottery.png")
@@ -78,34 +74,11 @@ drive(async () => {
 """ % (json.dumps(NAMES[0]), json.dumps(NAMES[1:]))
 
 
-class Posts(Quiet):
-    def do_POST(self):
-        self.server.told = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-        self.send_response(204)
-        self.end_headers()
-        self.server.done.set()
-
-
 @unittest.skipUnless((ROOT / "build/web/web/engine-plain.wasm").exists(), "needs the preset web")
 class Engines(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="modar-engines-"))
         self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
-
-    def visit(self, start, site, page):
-        http_server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Posts, directory=str(site)))
-        http_server.done = threading.Event()
-        threading.Thread(target=http_server.serve_forever, daemon=True).start()
-        process = start(f"http://localhost:{http_server.server_port}/{page}")
-        try:
-            self.assertTrue(http_server.done.wait(420), "it reported nothing")
-        finally:
-            os.killpg(process.pid, 9)
-            process.wait()
-            http_server.shutdown()
-            http_server.server_close()
-        self.assertNotIn("error", http_server.told)
-        return http_server.told
 
     def lay_files(self, site):
         (site / "test").mkdir()
@@ -120,7 +93,8 @@ class Engines(unittest.TestCase):
         names = []
         for name, start in engines(self):
             with self.subTest(name):
-                told = self.visit(start, site, page)
+                told = report_of(site, start, page, 420)
+                self.assertNotIn("error", told)
                 names.append(name)
                 judge(told)
                 print(name, {key: round(value) for key, value in told.items() if isinstance(value, float)}, flush=True)

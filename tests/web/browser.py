@@ -212,6 +212,32 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
         pass
 
 
+class Reports(Quiet):
+    """Takes what the page posts as JSON."""
+    def do_POST(self):
+        self.server.told = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+        self.send_response(204)
+        self.end_headers()
+        self.server.done.set()
+
+
+def report_of(site, start, page="", seconds=240):
+    """What a page of that folder posts in a browser of engines()."""
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Reports, directory=str(site)))
+    server.done = threading.Event()
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    process = start(f"http://localhost:{server.server_port}/{page}")
+    try:
+        if not server.done.wait(seconds):
+            raise AssertionError("the page reported nothing")
+    finally:
+        os.killpg(process.pid, 9)
+        process.wait()
+        server.shutdown()
+        server.server_close()
+    return server.told
+
+
 class Counted(Quiet):
     def log_request(self, code="-", size="-"):
         self.server.answered.append((self.path, int(code)))

@@ -1,17 +1,14 @@
 """<modar-viewer> in a page of somebody else's, in each browser that is installed: what it shows, what it tells, who can use it."""
-import http.server
 import json
 import math
-import os
 import pathlib
 import shutil
 import subprocess
 import sys
-import threading
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
-from browser import Quiet, axe_core, engines  # noqa: E402
+from browser import axe_core, engines, report_of  # noqa: E402
 from programs import COVER, ROOT, ProgramTest, demo_files  # noqa: E402
 
 PAGE = ROOT / "build" / "web" / "web"
@@ -20,14 +17,6 @@ TEXTS = """
 text.de = "Um 1890."
 alt.de = "Eine Vase mit zwei Henkeln"
 """
-
-
-class Listening(Quiet):
-    def do_POST(self):
-        self.server.facts = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-        self.send_response(204)
-        self.end_headers()
-        self.server.done.set()
 
 
 class Viewer(ProgramTest):
@@ -47,20 +36,6 @@ class Viewer(ProgramTest):
             page = site / "index.html"
             page.write_text(page.read_text().replace("</title>", '</title><script src="axe.js"></script>'))
         return site, axe is not None
-
-    def visit(self, site, start):
-        server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), lambda *words: Listening(*words, directory=str(site)))
-        server.done = threading.Event()
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        process = start(f"http://localhost:{server.server_port}/")
-        try:
-            self.assertTrue(server.done.wait(240), "the page reported nothing")
-        finally:
-            os.killpg(process.pid, 9)
-            process.wait()
-            server.shutdown()
-            server.server_close()
-        return server.facts
 
     def assert_models_stand_on_the_picture(self, seen):
         """The middle of the drawing is near the picture's corners as the event states them, in a frame that fills the layer."""
@@ -116,7 +91,7 @@ class Viewer(ProgramTest):
         for name, start in engines(self):
             with self.subTest(name):
                 names.append(name)
-                self.judge(self.visit(site, start), with_axe)
+                self.judge(report_of(site, start), with_axe)
         print(f"played in {', '.join(names)}; axe-core {'found nothing' if with_axe else 'is not there'}")
         self.assertTrue(names, "no browser is installed")
 
