@@ -117,10 +117,11 @@ Result<OutputFolder> OutputFolder::claim(const std::string& folder, bool force) 
 
 Result<void> OutputFolder::write(const std::string& name, std::span<const std::byte> bytes) {
   const fs::path file = fs::path(staging_) / name;
-  MODAR_TRY(make_output_folder(file.parent_path().string()));
-  names_.push_back(name);
+  // Registered before they are made: a signal may come at any time.
   leftovers_.emplace_back(file.parent_path().string());
   leftovers_.emplace_back(file.string());
+  MODAR_TRY(make_output_folder(file.parent_path().string()));
+  names_.push_back(name);
   auto written = write_file(file.string(), bytes);
   if (!written) written.error().where = path(name);
   return written;

@@ -73,10 +73,11 @@ const char* cure_of_writing(int number) {
   }
 }
 
-AtomicFile::AtomicFile(int descriptor, std::string path, std::string temporary)
-    : descriptor_(descriptor), path_(std::move(path)), temporary_(std::move(temporary)) {
-  if (!temporary_.empty()) leftover_ = Leftover(temporary_);
-}
+AtomicFile::AtomicFile(int descriptor, std::string path, std::string temporary, Leftover leftover)
+    : descriptor_(descriptor),
+      path_(std::move(path)),
+      temporary_(std::move(temporary)),
+      leftover_(std::move(leftover)) {}
 
 AtomicFile::AtomicFile(AtomicFile&& other) noexcept
     : descriptor_(std::exchange(other.descriptor_, -1)),
@@ -101,11 +102,12 @@ Result<AtomicFile> AtomicFile::create(const std::string& path) {
   if (there && !S_ISREG(old.st_mode)) {
     // A device, a pipe or a socket is written to, not replaced; a folder refuses by itself.
     const int descriptor = ::open(target.c_str(), O_WRONLY | O_CLOEXEC);
-    return descriptor < 0 ? Result<AtomicFile>(refused()) : AtomicFile(descriptor, target, "");
+    return descriptor < 0 ? Result<AtomicFile>(refused()) : AtomicFile(descriptor, target, "", {});
   }
   std::string temporary = target + "." + std::to_string(::getpid()) + ".tmp";
   // What an interrupted process of this number left is removed, whatever it is: never written to.
   ::unlink(temporary.c_str());
+  Leftover leftover(temporary);  // before the file is there: a signal may come at any time
   const int descriptor =
       ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666);
   if (descriptor < 0) return refused();
@@ -123,7 +125,7 @@ Result<AtomicFile> AtomicFile::create(const std::string& path) {
       return refused();
     }
   }
-  return AtomicFile(descriptor, target, std::move(temporary));
+  return AtomicFile(descriptor, target, std::move(temporary), std::move(leftover));
 }
 
 Result<void> AtomicFile::write(std::span<const std::byte> bytes) {

@@ -32,7 +32,7 @@ class AtomicFile {
   Result<void> commit();
 
  private:
-  AtomicFile(int descriptor, std::string path, std::string temporary);
+  AtomicFile(int descriptor, std::string path, std::string temporary, Leftover leftover);
   int descriptor_ = -1;
   std::string path_;
   std::string temporary_;

@@ -295,13 +295,19 @@ class Page(StudioTest):
                 self.choose_film()
             hand.wait("document.querySelector('.playing .hint')?.textContent.includes('wall')", source)
             self.keep(f"14-{source}")
-            self.assertGreater(self.model_pixels(), 2000, source)
+            self.wait_for_the_model(source)
             hand.click(".playing .over")
 
     def choose_film(self):
         call = self.hand.call
         node = call("DOM.querySelector", nodeId=call("DOM.getDocument")["root"]["nodeId"], selector=".way input[type=file]")["nodeId"]
         call("DOM.setFileInputFiles", files=[str(self.folder / "walk.mp4")], nodeId=node)
+
+    def wait_for_the_model(self, source, seconds=90):
+        """The print is named at its first frame; the model is drawn when its files are there."""
+        end = time.monotonic() + seconds
+        while (seen := self.model_pixels()) <= 2000:
+            self.assertLess(time.monotonic(), end, f"{source}: {seen} bright pixels")
 
     def model_pixels(self):
         """Of the screen that are bright where the camera's picture is taken away: the pot's."""
@@ -508,7 +514,7 @@ class Page(StudioTest):
         self.choose_film()
         hand.wait("document.querySelector('.playing .hint')?.textContent.includes('band')", "the can")
         self.keep("can")
-        self.assertGreater(self.model_pixels(), 2000)
+        self.wait_for_the_model("the film")
         bundle = next((self.project / "out").glob("*.modar"))
         done = self.run_program("modar-play", bundle, "--input", self.folder / "walk.mp4", "--json")
         frames = [line for line in map(json.loads, done.stdout.splitlines()) if "frame" in line]
