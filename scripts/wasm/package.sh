@@ -7,8 +7,9 @@ out=${1:?a folder is missing}
 rm -rf "$out"
 mkdir -p "$out/bin"
 cp -a "$root/build/web/web/." "$out"
-cp "$root"/build/wasm/bin/baker.{js,wasm} "$root"/bake/extensions/wasm/{modar,paths.js} "$out/bin"
+cp "$root"/build/wasm/bin/baker.{js,wasm} "$root"/bake/extensions/wasm/{modar,paths.js,server.js,studio.js} "$out/bin"
 echo '{ "type": "commonjs" }' >"$out/bin/package.json"
+"$root/scripts/wasm/studio_page.sh" "$out/studio"
 # The library: the same WebAssembly under a script whose files are in memory.
 cmp "$root"/build/wasm/bin/baker{,-module}.wasm
 mkdir "$out/bin/module"
@@ -18,15 +19,15 @@ cp "$root"/bake/extensions/wasm/{bake.js,bake.d.ts,bake-worker.js,platform.js} "
 node "$out/bin/modar" document -o "$out/documents"
 mv "$out/documents/modar/commands.d.ts" "$out"
 rm -r "$out/documents"
-# Notices: of the built libraries from their sources, of header-only ones from their packages.
+# Notices: of the built libraries from their sources, of header-only ones and of mithril from their packages.
 for archive in "$root"/build/sources/*.debian.tar.xz; do
   printf '\n\n---- bin/baker.wasm holds code of %s ----\n\n' "$(basename "$archive" .debian.tar.xz)"
   tar -xJOf "$archive" debian/copyright
 done >>"$out/LICENSE"
 for package in libcli11-dev libexpected-dev libfast-float-dev libstb-dev libtinygltf-dev libtomlplusplus-dev libxxhash-dev \
-  nlohmann-json3-dev rapidjson-dev; do
+  nlohmann-json3-dev rapidjson-dev node-mithril; do
   [ -e "/usr/share/doc/$package/copyright" ] || continue
-  printf '\n\n---- bin/baker.wasm holds code of %s ----\n\n' "$package"
+  printf '\n\n---- the package holds code of %s ----\n\n' "$package"
   cat "/usr/share/doc/$package/copyright"
 done >>"$out/LICENSE"
 python3 - "$out" <<'END'

@@ -6,13 +6,10 @@ set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 out=${1:?a folder is missing}
 archive=${2:?an archive is missing}
-page=$root/bake/extensions/studio/page
+
 rm -rf "$out"
-mkdir -p "$out/baker" "$out/words"
-cp "$page"/*.js "$page/style.css" "$out"
-cp "$page"/words/*.json "$out/words"
-mithril=$(find /usr/lib/nodejs/mithril /usr/share/nodejs/mithril -maxdepth 1 -name mithril.js 2>/dev/null | head -n 1 || true)
-cp "${mithril:?node-mithril is missing: scripts/setup.sh web}" "$out/mithril.js"
+"$root/scripts/wasm/studio_page.sh" "$out"
+mkdir "$out/baker"
 cp -a "$root/build/web/web" "$out/engine"
 find "$out/engine" -name '*.map' -delete
 cmp "$root"/build/wasm/bin/baker{,-module}.wasm
@@ -20,7 +17,7 @@ cp "$root/build/wasm/bin/baker.wasm" "$out/baker"
 cp "$root/build/wasm/bin/baker-module.js" "$out/baker/baker.js"
 cp "$root"/bake/extensions/wasm/studio/*.js "$out"
 sed -i "s/MODAR_PROGRAM_BYTES/$(stat -c %s "$out/baker/baker.wasm")/" "$out/studio-static.js"
-python3 - "$page/index.html" "$out" "$archive" <<'END'
+python3 - "$out/index.html" "$out" "$archive" <<'END'
 import hashlib, json, pathlib, sys, zipfile
 index, out, archive = map(pathlib.Path, sys.argv[1:])
 text = index.read_text()

@@ -13,6 +13,10 @@ import urllib.parse
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "cli"))
 from programs import BIN, ProgramTest  # noqa: E402
 
+# The program that is tried: another one answers the same, such as the npm package's.
+PROGRAM = os.environ.get("MODAR_STUDIO_PROGRAM", str(BIN / "modar")).split()
+NATIVE = "MODAR_STUDIO_PROGRAM" not in os.environ
+
 
 class Answer:
     def __init__(self, response, body):
@@ -28,7 +32,7 @@ class Studio:
 
     def __init__(self, folder, *options, env=None):
         self.folder = pathlib.Path(folder)
-        self.process = subprocess.Popen([BIN / "modar", "studio", folder, "--no-browser", *options], stdout=subprocess.PIPE,
+        self.process = subprocess.Popen([*PROGRAM, "studio", folder, "--no-browser", *options], stdout=subprocess.PIPE,
                                         stderr=subprocess.PIPE, text=True, env={**os.environ, **(env or {})})
         self.address = self.process.stdout.readline().strip()
         if not self.address:

@@ -4,15 +4,18 @@ MODAR_MORE: a folder whose models and pictures are baked as well, each by itself
 """
 import filecmp
 import hashlib
+import http.client
 import json
 import os
 import pathlib
 import shutil
+import ssl
 import subprocess
 import sys
 import tempfile
 import time
 import unittest
+import urllib.parse
 
 TESTS = pathlib.Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS / "cli"), str(TESTS / "web")]
@@ -33,7 +36,7 @@ class Node(unittest.TestCase):
             (cls.base / folder).mkdir()
         package = cls.base / "package" / "bin"
         package.mkdir(parents=True)
-        for file in ("modar", "paths.js"):
+        for file in ("modar", "paths.js", "studio.js"):
             shutil.copy(ROOT / "bake/extensions/wasm" / file, package)
         for file in ("baker.js", "baker.wasm"):
             shutil.copy(ROOT / "build/wasm/bin" / file, package)
@@ -147,6 +150,45 @@ class Library(unittest.TestCase):
         cls.addClassCleanup(shutil.rmtree, cls.base, ignore_errors=True)
         cls.laid = cls.base / "laid"
         subprocess.run([ROOT / "scripts/wasm/package.sh", cls.laid], check=True)
+
+    def test_the_studio_answers_as_the_native_one(self):
+        """All that its pages and its attackers ask, and a project made by mouse alone."""
+        environment = {**os.environ, "MODAR_STUDIO_PROGRAM": f"node {self.laid / 'bin/modar'}"}
+        for name, *cases in (("edit",), ("server",), ("attack",), ("studio", "-k", "twelve_clicks")):
+            with self.subTest(name):
+                run = subprocess.run([sys.executable, TESTS / f"studio/{name}_test.py", *cases], env=environment, capture_output=True, text=True)
+                self.assertEqual(run.returncode, 0, run.stderr[-3000:])
+
+    def test_it_serves_a_site_to_phones(self):
+        bundle, site = self.base / "served.modar", self.base / "served"
+        subprocess.run([BIN / "modar", "bake", "--quiet", ASSETS / "patterns/cover.png", "-o", bundle], check=True)
+        process = subprocess.Popen(["node", self.laid / "bin/modar", "web", bundle, "-o", site, "--serve", "--bind", "127.0.0.1", "--port", "0"],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.communicate)
+        self.addCleanup(process.kill)
+        url = urllib.parse.urlsplit(process.stdout.readline().strip())
+        signed = self.base / "signed.pem"
+        signed.write_text(ssl.get_server_certificate((url.hostname, url.port)))
+        trusting = ssl.create_default_context(cafile=signed)  # and its name is looked at
+        with self.assertRaises(ssl.SSLError):
+            http.client.HTTPSConnection("localhost", url.port).request("GET", "/")
+
+        def get(path, **headers):
+            connection = http.client.HTTPSConnection("localhost", url.port, context=trusting)
+            connection.request("GET", path, headers=headers)
+            answer = connection.getresponse()
+            body = answer.read()
+            connection.close()
+            return answer, body
+        for name in ("index.html", "app.js", "engine-simd.wasm", "bundles/served.modar"):
+            self.assertEqual(get("/" + name)[1], (site / name).read_bytes(), name)
+        answer, body = get("/app.js", Range="bytes=10-19")
+        self.assertEqual((answer.status, body), (206, (site / "app.js").read_bytes()[10:20]))
+        self.assertEqual(get("/app.js", Range="bytes=-7")[1], (site / "app.js").read_bytes()[-7:])
+        self.assertEqual(get("/app.js", Range="bytes=99999999-")[0].status, 416)
+        (site / "link.txt").symlink_to(bundle)
+        for path in ("/.modar-output", "/../served.modar", "/%2e%2e/served.modar", "/link.txt", "/none", "/%ff"):
+            self.assertEqual(get(path)[0].status, 404, path)
 
     def test_node_has_what_the_native_program_has(self):
         subprocess.run(["node", "--test", TESTS / "wasm/library_test.mjs"], check=True,

@@ -43,6 +43,19 @@ struct Session {
   std::function<void()> quit;  ///< ends the studio
 };
 
+/// The page installed or built with the programs. Errors: kUnsupported "studio.page".
+Result<std::string> find_studio_page();
+
+/// Makes the project's folder where it is missing, and the studio's own in it. Answers its
+/// canonical path. Errors: kUsage "studio.folder"; kIo "io.folder".
+Result<std::string> make_project_folder(const std::string& name);
+
+/// Of what processes were writing when they were killed.
+void clear_leftovers(const Session& session);
+
+/// Tells all pages of a change by another editor. files: of one that a bake may read.
+void report_project(Session& session, bool files);
+
 /// The project as the page sees it: GET api/project.
 Result<Json> project_view(Session& session);
 

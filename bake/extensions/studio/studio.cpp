@@ -27,17 +27,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The page installed or built with the programs.
-Result<std::string> find_studio_page() {
-  const fs::path programs = program_folder();
-  for (const fs::path& folder : {programs / "../share/modar/studio", programs / "../studio"}) {
-    if (fs::exists(folder / "index.html")) return folder.lexically_normal().string();
-  }
-  return fail(ExitCode::kUnsupported, "studio.page", programs.string(),
-              "the studio's page is not next to the programs",
-              "install the package again; from the source: scripts/setup.sh web, and build again");
-}
-
 /// While one exists, SIGINT and SIGTERM call `ended` in place of ending the process.
 class Signals {
  public:
@@ -68,22 +57,6 @@ class Signals {
   std::thread thread_;
 };
 
-/// What processes that were killed have left of what they were writing.
-void clear_leftovers(const Session& session) {
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(session.folder, error)) {
-    const std::string name = entry.path().filename().string();
-    const bool ours = name.starts_with(kShownProject) ||
-                      (name.starts_with(std::string(kProjectFile) + ".") && name.ends_with(".tmp"));
-    if (ours) fs::remove(entry.path(), error);
-  }
-  for (const auto& entry : fs::directory_iterator(session.own, error)) {
-    const std::string name = entry.path().filename().string();
-    const bool ours = name.starts_with("incoming-") || name.starts_with("unpacked-");
-    if (ours) fs::remove_all(entry.path(), error);
-  }
-}
-
 /// A file that only its owner may read: where the studio answers, for one that is started later.
 Result<void> write_private(const std::string& path, const std::string& text) {
   ::unlink(path.c_str());
@@ -107,26 +80,13 @@ Result<void> show_other(const Session& session, const Error& busy,
   return {};
 }
 
-/// files: an editor wrote something that a bake may read.
-void report_project(Session& session, bool files) {
-  const auto state = session.text.read();
-  session.events.publish("project", {{"revision", state ? state->revision : ""}, {"files", files}});
-}
-
 }  // namespace
 
 Result<void> run_studio(const StudioOptions& options,
                         const std::function<void(const StudioAddress&)>& ready) {
   MODAR_ASSIGN(const std::string page, find_studio_page());
-  MODAR_TRY(make_output_folder(options.folder));
-  std::error_code error;
-  const std::string folder = fs::canonical(options.folder, error).string();
+  MODAR_ASSIGN(const std::string folder, make_project_folder(options.folder));
   Session session(folder, options.tool_version);
-  MODAR_TRY(make_output_folder(session.own));
-  if (fs::canonical(session.own, error) != fs::path(session.own)) {
-    return fail(ExitCode::kUsage, "studio.folder", session.own,
-                "it is a link that leads out of the project's folder", "remove the link");
-  }
   const auto lock = FolderLock::take(session.own + "/lock", {ExitCode::kIo, "studio.locked", folder,
                                                              "another studio has this folder open",
                                                              "use its page, or end it first"});
@@ -158,7 +118,8 @@ Result<void> run_studio(const StudioOptions& options,
   }
   session.jobs.end();
   session.phone_server.end();
-  fs::remove(session.own + "/address", error);
+  std::error_code ignored;
+  fs::remove(session.own + "/address", ignored);
   return {};
 }
 

@@ -28,7 +28,8 @@ const folder = here.toProgram(__dirname);
 
 /** Runs a program: words[0], this one as "modar" in its folder, with the rest as its arguments. */
 function run(words, options) {
-  const [program, ...rest] = words.map(here.toSystem);
+  const opener = { win32: ['cmd', '/c', 'start', ''], darwin: ['open'] }[process.platform] ?? ['xdg-open'];
+  const [program, ...rest] = (words[0] === 'xdg-open' ? [...opener, ...words.slice(1)] : words).map(here.toSystem);
   return words[0] === `${folder}/modar`
     ? childProcess.spawnSync(process.execPath, [`${__dirname}/modar`, ...rest], options)
     : childProcess.spawnSync(program, rest, options);

@@ -3,6 +3,7 @@
 #include <new>
 
 #include "bake/extensions/web/serve.hpp"
+#include "bake/json.hpp"
 #include "bake/memory/array.hpp"
 #include "bake/memory/memory_limit.hpp"
 #include "bake/process/process.hpp"
@@ -15,6 +16,10 @@
 extern "C" int modar_node_run(const void* words, const void* variables, const char* output);
 /// To be freed by the caller.
 extern "C" char* modar_node_folder();
+/// {"folder", "bind", "port"}. Answers {"urls", "code"}, or {"error"}, to be freed by the caller.
+extern "C" char* modar_node_serve_site(const char* options);
+/// Until the process is ended.
+extern "C" void modar_node_wait();
 
 namespace modar {
 namespace {
@@ -85,6 +90,37 @@ std::unique_lock<std::mutex> Interrupts::writing() {
   return std::unique_lock(watch_->writing);
 }
 
+// ---- the server ----
+
+namespace {
+
+std::string served_code;  ///< of the first address
+
+}  // namespace
+
+Result<void> serve_site(const ServeOptions& options,
+                        const std::function<void(const std::vector<std::string>&)>& ready) {
+  const Json asked = {{"folder", options.folder}, {"bind", options.bind}, {"port", options.port}};
+  const std::unique_ptr<char, decltype(&std::free)> answer(
+      modar_node_serve_site(asked.dump().c_str()), std::free);
+  const Json told = Json::parse(answer.get());
+  if (const auto error = told.find("error")) {
+    return fail(ExitCode::kIo, "web.port", options.bind + ":" + std::to_string(options.port),
+                error->text().value_or(""), "name another address or port: --bind, --port");
+  }
+  served_code = told.find("code").value_or("").text().value_or("");
+  std::vector<std::string> urls;
+  const Json list = told.find("urls").value_or(Json::array());
+  for (std::size_t i = 0; i < list.size(); ++i) urls.push_back(list.at(i)->text().value_or(""));
+  ready(urls);
+  modar_node_wait();
+  return {};
+}
+
+std::string qr_code(const std::string&) {
+  return served_code;
+}
+
 // ---- missing ----
 
 bool is_web_address(const std::string& text) {
@@ -105,17 +141,6 @@ Result<Video> Video::open(const std::string& path) {
 
 std::optional<GrayImage> Video::next() {
   return std::nullopt;
-}
-
-Result<void> serve_site(const ServeOptions& options,
-                        const std::function<void(const std::vector<std::string>&)>&) {
-  return fail(ExitCode::kUnsupported, "web.node", options.folder,
-              "under Node, modar serves nothing",
-              std::string("put the folder on a web server with HTTPS; ") + kNative);
-}
-
-std::string qr_code(const std::string&) {
-  return {};
 }
 
 std::string qr_svg(const std::string&) {

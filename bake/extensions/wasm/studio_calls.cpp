@@ -1,6 +1,6 @@
-// The studio without a server: a page's worker hands its requests over, and takes answers and
-// events. A job runs in a second instance of the program, in a worker of its own, with a copy of
-// the files.
+// The studio without a server of its own: a page's worker, or Node's server, hands requests over,
+// and takes answers and events. A job runs in a second instance of the program: in a worker of its
+// own with a copy of the files, or in a process.
 #include <emscripten/emscripten.h>
 
 #include <cstdint>
@@ -8,21 +8,29 @@
 #include <string>
 
 #include "bake/extensions/studio/archive.hpp"
+#include "bake/extensions/studio/folder_state.hpp"
 #include "bake/extensions/studio/phone.hpp"
 #include "bake/extensions/studio/session.hpp"
 #include "bake/extensions/wasm/studio_job.hpp"
 #include "bake/io/output.hpp"
+
+/// Of node.js: ends the server.
+extern "C" void modar_studio_quit();
 
 namespace modar {
 namespace {
 
 struct Studio {
   explicit Studio(const std::string& folder) : session(folder, MODAR_VERSION) {
-    session.quit = [] {};
+    session.quit = [this] {
+      session.events.publish("quit", Json::object());
+      modar_studio_quit();
+    };
   }
   Session session;
   Answer answer;
   std::string text;  ///< that was returned last
+  FolderState files;
 };
 
 std::unique_ptr<Studio> studio;
@@ -38,12 +46,13 @@ std::string text_in(const Json& json, const char* key) {
 
 }  // namespace
 
-// ---- what a page of this kind does not have ----
+// ---- what a studio of this kind does not have ----
 
 Answer post_phone(Session&) {
   return answer_of(Error{ExitCode::kUnsupported, "studio.phone", "",
-                         "a page cannot serve the result to a phone",
-                         "download the page as a ZIP file and put it on a web server"});
+                         "this studio cannot serve the result to a phone",
+                         "`modar web BUNDLE -o FOLDER --serve` in a terminal does; or download the "
+                         "page as a ZIP file and put it on a web server"});
 }
 
 Answer end_phone(Session&) {
@@ -54,7 +63,7 @@ void refresh_phone(Session&) {}
 
 }  // namespace modar
 
-// ---- of studio-worker.js ----
+// ---- of studio-worker.js and studio.js ----
 
 /// job: 0 for the instance that answers the page; else the number of the job that this one runs.
 extern "C" EMSCRIPTEN_KEEPALIVE void studio_open(const char* folder, unsigned job) {
@@ -62,6 +71,17 @@ extern "C" EMSCRIPTEN_KEEPALIVE void studio_open(const char* folder, unsigned jo
   modar::studio = std::make_unique<modar::Studio>(folder);
   // Without it nothing can be kept, which the first upload reports.
   static_cast<void>(modar::make_output_folder(modar::studio->session.own));
+}
+
+/// Publishes that another editor has changed the project's files since the last call, if so.
+extern "C" EMSCRIPTEN_KEEPALIVE void studio_look() {
+  modar::Studio& studio = *modar::studio;
+  const modar::FolderState now = modar::folder_state(studio.session.folder);
+  const bool known = studio.files.all != modar::FolderState().all;
+  if (known && now.all != studio.files.all) {
+    modar::report_project(studio.session, now.sources != studio.files.sources);
+  }
+  studio.files = now;
 }
 
 /// The files of a project that was exported, into its folder. Answers null, or the error.
@@ -112,17 +132,20 @@ extern "C" EMSCRIPTEN_KEEPALIVE void studio_publish(const char* name, const char
   modar::studio->session.events.publish(name, modar::Json::parse(data));
 }
 
-/// Of the instance that ran the job: what the project had baked when it began.
-extern "C" EMSCRIPTEN_KEEPALIVE const char* studio_baked_scenes() {
+/// Of the instance that runs a job: what the project had when its bake began; "null": none has.
+extern "C" EMSCRIPTEN_KEEPALIVE const char* studio_scenes() {
   return modar::returned(modar::studio->session.baked_scenes);
 }
 
-/// The job of the page's instance is over, with these scenes; null: none were baked.
-extern "C" EMSCRIPTEN_KEEPALIVE void studio_job_ended(const char* baked_scenes) {
-  modar::Session& session = modar::studio->session;
-  const modar::Json scenes = modar::Json::parse(baked_scenes);
-  if (!scenes.is_null()) session.baked_scenes = scenes;
-  session.jobs.cancel();
+/// The same, in the page's instance.
+extern "C" EMSCRIPTEN_KEEPALIVE void studio_set_scenes(const char* scenes) {
+  const modar::Json list = modar::Json::parse(scenes);
+  if (!list.is_null()) modar::studio->session.baked_scenes = list;
+}
+
+/// The job of the page's instance is over.
+extern "C" EMSCRIPTEN_KEEPALIVE void studio_job_ended() {
+  modar::studio->session.jobs.cancel();
 }
 
 /// A line that the program has printed, on stdout (1) or stderr (2).

@@ -296,7 +296,7 @@ function sendEvents() {
   if (!events.length) return;
   // Whoever hears of a job may ask for what it has made.
   const done = isJob && events.some(({name}) => name !== 'progress');
-  self.postMessage({events, files: done ? changes() : undefined});
+  self.postMessage({events, files: done ? changes() : undefined, scenes: isJob ? modar.ccall('studio_scenes', 'string', [], []) : undefined});
 }
 
 /** What `modar web` copies into a site: the page, fetched once. */
@@ -344,18 +344,19 @@ function startJob(mine, call) {
 
 /**
  * @param {Job} mine
- * @param {{events: {name: string, data: string}[], files?: Map<string, Uint8Array | null>, ended?: string, broken?: string}} told
+ * @param {{events: {name: string, data: string}[], files?: Map<string, Uint8Array | null>, scenes?: string, ended?: boolean, broken?: string}} told
  */
-async function jobTold(mine, {events, files: made, ended, broken}) {
+async function jobTold(mine, {events, files: made, scenes, ended, broken}) {
   if (job !== mine) return;
   if (broken !== undefined) return jobFailed(mine, broken);
   if (made) {
     putFiles(made);
     await keep(changes()).catch((error) => self.postMessage({notice: wrongOf(error)}));
   }
-  if (ended !== undefined) {
+  if (scenes) modar.ccall('studio_set_scenes', null, ['string'], [scenes]);
+  if (ended) {
     mine.ended = true;
-    modar.ccall('studio_job_ended', null, ['string'], [ended]);
+    modar.ccall('studio_job_ended', null, [], []);
   }
   for (const {name, data} of events) modar.ccall('studio_publish', null, ['string', 'string'], [name, data]);
   sendEvents();
@@ -376,7 +377,7 @@ function jobFailed(mine, cause) {
     code: 'studio.memory',
     errors: []
   };
-  modar.ccall('studio_job_ended', null, ['string'], ['null']);
+  modar.ccall('studio_job_ended', null, [], []);
   modar.ccall('studio_publish', null, ['string', 'string'], ['failed', JSON.stringify(told)]);
   sendEvents();
 }
@@ -401,8 +402,8 @@ async function beginJob(data) {
   changes();
   modar.ccall('studio_open', null, ['string', 'number'], [folder, data.job]);
   ask(data.call);
-  const ended = modar.ccall('studio_baked_scenes', 'string', [], []);
-  self.postMessage({events: newEvents(), files: changes(), ended});
+  const scenes = modar.ccall('studio_scenes', 'string', [], []);
+  self.postMessage({events: newEvents(), files: changes(), scenes, ended: true});
 }
 
 /** @param {{program: WebAssembly.Module, chosen: {name: string, folder?: FileSystemDirectoryHandle}}} begin */
