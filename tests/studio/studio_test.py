@@ -32,7 +32,12 @@ AXE = """axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa
 # When the pointer was moved, when the preview showed it, and what the stage did of it in the same event.
 WATCH = """(() => {
   globalThis.seen = { moves: [], shown: [], drawn: [] };
-  addEventListener('pointermove', () => { seen.moves.push(performance.now()); seen.before = stage()?.dataset.drawn; }, true);
+  let place = '';
+  addEventListener('pointermove', ({ clientX, clientY }) => {
+    if (place !== `${clientX} ${clientY}`) seen.moves.push(performance.now());  // browsers repeat events where nothing moved
+    place = `${clientX} ${clientY}`;
+    seen.before = stage()?.dataset.drawn;
+  }, true);
   addEventListener('pointermove', () => {
     if (stage()) seen.drawn.push([performance.now() - seen.moves.at(-1), stage().dataset.drawn - seen.before]);
   });
