@@ -141,13 +141,25 @@ enum TextureFlags : std::uint32_t {
 /// What a texture shows outside of [0,1].
 enum class Wrap : std::uint8_t { kClamp, kRepeat, kMirror };
 
-/// What flags of a texture say of u and v.
-constexpr std::array<Wrap, 2> texture_wrap(std::uint32_t flags) {
+/// Along u and v.
+using TextureWrap = std::array<Wrap, 2>;
+inline constexpr TextureWrap kWrapRepeat = {Wrap::kRepeat, Wrap::kRepeat};
+
+/// What flags of a texture say.
+constexpr TextureWrap texture_wrap(std::uint32_t flags) {
   const auto along = [flags](std::uint32_t mirror, std::uint32_t clamp) {
     if ((flags & kTextureRepeat) == 0 || (flags & clamp) != 0) return Wrap::kClamp;
     return (flags & mirror) != 0 ? Wrap::kMirror : Wrap::kRepeat;
   };
   return {along(kTextureMirrorU, kTextureClampU), along(kTextureMirrorV, kTextureClampV)};
+}
+
+/// The texel of a row of `size` that place x shows.
+constexpr std::int64_t wrapped(std::int64_t x, std::int64_t size, Wrap wrap) {
+  if (wrap == Wrap::kClamp) return x < 0 ? 0 : x < size ? x : size - 1;
+  const std::int64_t period = wrap == Wrap::kMirror ? 2 * size : size;
+  x = (x % period + period) % period;
+  return x < size ? x : period - 1 - x;
 }
 
 enum NodeFlags : std::uint32_t {

@@ -118,7 +118,7 @@ void GlbBuilder::add_images(const ModelRecord& model, std::span<const GlbImage> 
     tinygltf::Sampler sampler;
     constexpr int kModes[] = {TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE, TINYGLTF_TEXTURE_WRAP_REPEAT,
                               TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT};  // of Wrap
-    const std::array<Wrap, 2> wrap = texture_wrap(record.flags);
+    const TextureWrap wrap = texture_wrap(record.flags);
     sampler.wrapS = kModes[static_cast<std::size_t>(wrap[0])];
     sampler.wrapT = kModes[static_cast<std::size_t>(wrap[1])];
     gltf_.samplers.push_back(sampler);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "formats/base/error.hpp"
+#include "formats/sections.hpp"
 
 namespace modar {
 
@@ -84,8 +85,9 @@ Result<std::vector<std::byte>> encode_preview(const RgbaImage& image, std::uint3
                                               std::uint32_t height);
 
 /// Levels from the image itself down to 1x1, each side max(1, floor(side / 2)), filtered in linear
-/// light (sRGB-correct), colours weighted by alpha. repeat: the filter reaches across the edges, as
-/// a texture that repeats does.
-std::vector<RgbaImage> mip_chain(const RgbaImage& image, bool repeat = false, unsigned jobs = 1);
+/// light (sRGB-correct), colours weighted by alpha. The filter finds beyond the edges what
+/// the texture shows there.
+std::vector<RgbaImage> mip_chain(const RgbaImage& image, const TextureWrap& wrap = {},
+                                 unsigned jobs = 1);
 
 }  // namespace modar

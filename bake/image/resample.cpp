@@ -64,15 +64,7 @@ struct Taps {
   std::vector<float> weight;
 };
 
-std::uint32_t beyond_edge(std::int64_t index, std::uint32_t size, bool repeat) {
-  if (!repeat) {
-    return static_cast<std::uint32_t>(std::clamp<std::int64_t>(index, 0, std::int64_t{size} - 1));
-  }
-  const std::int64_t wrapped = index % size;
-  return static_cast<std::uint32_t>(wrapped < 0 ? wrapped + size : wrapped);
-}
-
-std::vector<Taps> plan(std::uint32_t from, std::uint32_t to, bool opaque, bool repeat) {
+std::vector<Taps> plan(std::uint32_t from, std::uint32_t to, bool opaque, Wrap wrap) {
   const double step = static_cast<double>(from) / to;
   const double width = std::max(1.0, step);  // of one unit of the kernel, in source samples
   const double reach = (opaque ? 2.0 : 1.0) * width;
@@ -87,7 +79,7 @@ std::vector<Taps> plan(std::uint32_t from, std::uint32_t to, bool opaque, bool r
       const double x = (static_cast<double>(k) - centre) / width;
       weights.push_back(opaque ? catmull_rom(x) : tent(x));
       sum += weights.back();
-      taps[i].index.push_back(beyond_edge(k, from, repeat));
+      taps[i].index.push_back(static_cast<std::uint32_t>(wrapped(k, from, wrap)));
     }
     for (const double weight : weights) {
       taps[i].weight.push_back(static_cast<float>(weight / sum));
@@ -98,7 +90,7 @@ std::vector<Taps> plan(std::uint32_t from, std::uint32_t to, bool opaque, bool r
 
 LinearImage resample_rows(const LinearImage& image, std::uint32_t height,
                           const ResampleOptions& options) {
-  const std::vector<Taps> taps = plan(image.height, height, image.opaque, options.repeat);
+  const std::vector<Taps> taps = plan(image.height, height, image.opaque, options.wrap[1]);
   const std::size_t stride = std::size_t{image.width} * 4;
   LinearImage out{image.width, height, image.opaque, std::vector<float>(stride * height)};
   parallel_rows(height, options.jobs, [&](std::uint32_t y) {
@@ -125,7 +117,7 @@ void filter_row(const float* row, const std::vector<Taps>& taps, float* to) {
 
 LinearImage resample_columns(const LinearImage& image, std::uint32_t width,
                              const ResampleOptions& options) {
-  const std::vector<Taps> taps = plan(image.width, width, image.opaque, options.repeat);
+  const std::vector<Taps> taps = plan(image.width, width, image.opaque, options.wrap[0]);
   LinearImage out{width, image.height, image.opaque,
                   std::vector<float>(std::size_t{width} * image.height * 4)};
   parallel_rows(image.height, options.jobs, [&](std::uint32_t y) {
@@ -208,8 +200,8 @@ RgbaImage resize(const RgbaImage& image, std::uint32_t width, std::uint32_t heig
   /// take less memory.
   constexpr std::uint32_t kBand = 16;
   const bool opaque = is_opaque(image);
-  const std::vector<Taps> rows = plan(image.height, height, opaque, options.repeat);
-  const std::vector<Taps> columns = plan(image.width, width, opaque, options.repeat);
+  const std::vector<Taps> rows = plan(image.height, height, opaque, options.wrap[1]);
+  const std::vector<Taps> columns = plan(image.width, width, opaque, options.wrap[0]);
   RgbaImage out{width, height, std::vector<std::uint8_t>(std::size_t{width} * height * 4)};
   parallel_rows((height + kBand - 1) / kBand, options.jobs, [&](std::uint32_t band) {
     resize_band(image, rows, columns, band * kBand, std::min(height, (band + 1) * kBand), out);
@@ -222,13 +214,13 @@ LinearImage resample(const LinearImage& image, std::uint32_t width, std::uint32_
   return resample_columns(resample_rows(image, height, options), width, options);
 }
 
-std::vector<RgbaImage> mip_chain(const RgbaImage& image, bool repeat, unsigned jobs) {
+std::vector<RgbaImage> mip_chain(const RgbaImage& image, const TextureWrap& wrap, unsigned jobs) {
   std::vector<RgbaImage> levels = {image};
   if (image.width == 0 || image.height == 0) return levels;
   LinearImage level = to_linear(image);
   while (level.width > 1 || level.height > 1) {
     level = resample(level, std::max(1U, level.width / 2), std::max(1U, level.height / 2),
-                     {repeat, jobs});
+                     {wrap, jobs});
     levels.push_back(to_srgb(level));
   }
   return levels;

@@ -22,8 +22,8 @@ struct LinearImage {
 
 /// How resample() treats the world beyond the edges, and how many threads it takes.
 struct ResampleOptions {
-  bool repeat = false;  ///< true: the image repeats; false: its edge pixels do
-  unsigned jobs = 1;    ///< the result does not depend on it
+  TextureWrap wrap{};  ///< what the filter finds there
+  unsigned jobs = 1;   ///< the result does not depend on it
 };
 
 /// Any image that read_image() reads, or a Radiance HDR (RGBE), whose alpha is 1 without the floor.

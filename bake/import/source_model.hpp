@@ -29,6 +29,7 @@ struct NormalMap {
   float scale = 1.0f;           ///< factor on red and green
   bool may_be_heights = false;  ///< MTL files name both alike: a grey picture is one of heights
   glm::dmat3 uv{1.0};           ///< from the base colour's uv, v down, to the map's
+  TextureWrap wrap = kWrapRepeat;
 
   bool operator==(const NormalMap&) const = default;
 };

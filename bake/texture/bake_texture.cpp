@@ -33,7 +33,7 @@ std::uint64_t pixel_count(const RgbaImage& image) {
 RgbaImage resized(const RgbaImage& image, const TextureOptions& options) {
   const TextureSize size = texture_size({image.width, image.height}, options);
   if (size.width == image.width && size.height == image.height) return image;
-  return resize(image, size.width, size.height, {filters_across(options.wrap), options.jobs});
+  return resize(image, size.width, size.height, {texture_wrap(options.wrap), options.jobs});
 }
 
 /// Whether all texels that are shown look the same.
@@ -124,7 +124,7 @@ std::vector<RgbaImage> make_levels(const RgbaImage& source, const TextureOptions
     return {top};
   }
   std::vector<RgbaImage> levels = options.mipmaps
-                                      ? mip_chain(top, filters_across(options.wrap), options.jobs)
+                                      ? mip_chain(top, texture_wrap(options.wrap), options.jobs)
                                       : std::vector<RgbaImage>{std::move(top)};
   texture.cut_out = texture.alpha && is_cut_out(levels.front());
   if (texture.cut_out) {

@@ -62,11 +62,6 @@ struct TextureOptions {
   std::string picture_folder;  ///< quality_picture() of level 0 goes there as NAME.png; empty: none
 };
 
-/// Whether coarser levels mix opposite edges: only where both axes repeat.
-constexpr bool filters_across(std::uint32_t wrap) {
-  return texture_wrap(wrap) == std::array<Wrap, 2>{Wrap::kRepeat, Wrap::kRepeat};
-}
-
 struct TextureSize {
   std::uint32_t width = 0;
   std::uint32_t height = 0;

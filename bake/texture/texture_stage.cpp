@@ -25,7 +25,7 @@ std::uint32_t use_of(const std::string& path, std::uint32_t wrap, TextureUses& t
     use.wrap = wrap;
     use.coverage = make_coverage(kCoverageSide, kCoverageSide);
     // Masks repeat, so all texels of other textures count as shown.
-    use.coverage.full = wrap != 0 && !filters_across(wrap);
+    use.coverage.full = wrap != 0 && texture_wrap(wrap) != kWrapRepeat;
   }
   return place->second;
 }

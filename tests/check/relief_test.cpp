@@ -311,6 +311,65 @@ TEST_F(Relief, MapsOfOtherSizesAndPlacesAreWhereTheyBelong) {
   EXPECT_EQ(made.pixels[4 * (64 * 20 + 50)], 255);
 }
 
+TEST_F(Relief, BeyondTheEdgeItIsWhereTheColourIs) {
+  // Normals that fan out, so that each place has a factor of its own.
+  const auto drawn = [&](const std::array<double, 2>& u, const std::array<double, 2>& v,
+                         std::uint32_t beyond, const std::string& map) {
+    TriMesh mesh = square("grey.png", map);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const glm::dvec3& p = mesh.positions[i];
+      mesh.normals[i] = glm::normalize(glm::vec3(0.2 * p.x, 0.3 * p.y, 1));
+      mesh.uvs[i] = {u[p.x > 0 ? 1 : 0], v[p.y > 0 ? 1 : 0]};
+    }
+    mesh.materials[0].beyond = kTextureRepeat | beyond;
+    EXPECT_TRUE(draw_relief(mesh, {}, report_));
+    return picture_of(mesh).pixels;
+  };
+  const auto tilted = [&](const glm::dvec3& map, const std::string& name) {
+    ASSERT_TRUE(write_png(plain(16, 16, stored(glm::normalize(map))), path(name)));
+  };
+  // Tilted across the axis that is mirrored: uvs written mirrored mean the same.
+  tilted({0, 0.4, 1}, "tall.png");
+  const auto tall = drawn({1, 0}, {1, 0}, 0, "tall.png");
+  EXPECT_NE(tall, drawn({0, 1}, {1, 0}, 0, "tall.png"));
+  EXPECT_EQ(drawn({1, 2}, {1, 0}, kTextureMirrorU, "tall.png"), tall);
+  EXPECT_EQ(drawn({-1, 0}, {1, 0}, kTextureMirrorU, "tall.png"), tall);
+  tilted({0.4, 0, 1}, "wide.png");
+  EXPECT_EQ(drawn({0, 1}, {2, 1}, kTextureMirrorV, "wide.png"),
+            drawn({0, 1}, {0, 1}, 0, "wide.png"));
+
+  // Two squares side by side on a clamped picture: the second shows its edge, and adds nothing.
+  TriMesh pair = square("grey.png", "wide.png");
+  const TriMesh alone = pair;
+  for (std::size_t i = 0; i < 4; ++i) {
+    pair.positions.push_back(alone.positions[i] + glm::dvec3(2, 0, 0));
+    pair.normals.push_back(glm::normalize(glm::vec3(1, 0, 1)));
+    pair.uvs.push_back(alone.uvs[i] + glm::dvec2(1, 0));
+  }
+  for (const auto& [a, b, c] : alone.triangles) {
+    pair.triangles.push_back({a + 4, b + 4, c + 4});
+    pair.triangle_material.push_back(0);
+  }
+  pair.materials[0].beyond = kTextureRepeat | kTextureClampU;
+  TriMesh one = alone;
+  ASSERT_TRUE(draw_relief(one, {}, report_));
+  ASSERT_TRUE(draw_relief(pair, {}, report_));
+  EXPECT_EQ(picture_of(pair).pixels, picture_of(one).pixels);
+
+  // A map that is flat at its last column, clamped there by a sampler of its own.
+  RgbaImage map = plain(16, 16, stored(glm::normalize(glm::dvec3(1, 1, 1))));
+  for (std::size_t y = 0; y < 16; ++y) {
+    std::copy_n(std::array<std::uint8_t, 3>{128, 128, 255}.data(), 3,
+                &map.pixels[4 * (16 * y + 15)]);
+  }
+  ASSERT_TRUE(write_png(map, path("edge.png")));
+  TriMesh mesh = square("grey.png", "edge.png");
+  for (glm::dvec2& uv : mesh.uvs) uv.x += 1;
+  mesh.materials[0].normal.wrap = {Wrap::kClamp, Wrap::kRepeat};
+  ASSERT_TRUE(draw_relief(mesh, {}, report_));
+  EXPECT_EQ(mesh.materials[0].diffuse_map, path("grey.png")) << "nothing to draw";
+}
+
 TEST_F(Relief, ThreadsMakeNoDifference) {
   RgbaImage map = plain(64, 64, {128, 128, 255});
   for (std::size_t i = 0; i < map.pixels.size(); i += 4) {

@@ -27,7 +27,7 @@ TEST(MipChain, AveragesLightAndNotCodes) {
     const int value = (x + y) % 2 == 0 ? 255 : 0;
     return std::array<int, 3>{value, value, value};
   });
-  const std::vector<RgbaImage> levels = mip_chain(board, true);
+  const std::vector<RgbaImage> levels = mip_chain(board, kWrapRepeat);
   for (std::size_t level = 1; level < levels.size(); ++level) {
     for (std::size_t i = 0; i < levels[level].pixels.size(); i += 4) {
       EXPECT_NEAR(levels[level].pixels[i], 188, 1) << "level " << level;
@@ -56,7 +56,7 @@ TEST(MipChain, TransparentPixelsLendNoColour) {
   for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
     if (image.pixels[i + 1] == 255) image.pixels[i + 3] = 0;
   }
-  const std::vector<RgbaImage> levels = mip_chain(image, true);
+  const std::vector<RgbaImage> levels = mip_chain(image, kWrapRepeat);
   for (std::size_t level = 1; level < levels.size(); ++level) {
     for (std::size_t i = 0; i < levels[level].pixels.size(); i += 4) {
       if (levels[level].pixels[i + 3] < 8) continue;
@@ -69,8 +69,8 @@ TEST(MipChain, TransparentPixelsLendNoColour) {
 
 TEST(MipChain, ThreadsChangeNothing) {
   const RgbaImage image = test::synthetic_photo(101, 64);
-  const std::vector<RgbaImage> one = mip_chain(image, false, 1);
-  const std::vector<RgbaImage> eight = mip_chain(image, false, 8);
+  const std::vector<RgbaImage> one = mip_chain(image, {}, 1);
+  const std::vector<RgbaImage> eight = mip_chain(image, {}, 8);
   ASSERT_EQ(one.size(), eight.size());
   for (std::size_t i = 0; i < one.size(); ++i) EXPECT_EQ(one[i].pixels, eight[i].pixels);
 }
@@ -82,12 +82,15 @@ TEST(MipChain, RepeatReachesAcrossTheEdge) {
     });
     // The first column and the last row of the half are next to the light only where it repeats.
     const std::size_t last = std::size_t{side / 2} * (side / 2 - 1) * 4;
-    const RgbaImage clamped = mip_chain(image, false)[1];
+    const RgbaImage clamped = mip_chain(image)[1];
     EXPECT_EQ(clamped.pixels[last], 0) << side;
     EXPECT_EQ(clamped.pixels[last + 1], 0) << side;
-    const RgbaImage repeated = mip_chain(image, true)[1];
+    const RgbaImage repeated = mip_chain(image, kWrapRepeat)[1];
     EXPECT_GT(repeated.pixels[last], 10) << side;
     EXPECT_GT(repeated.pixels[last + 1], 10) << side;
+    const RgbaImage across = mip_chain(image, {Wrap::kRepeat, Wrap::kMirror})[1];
+    EXPECT_GT(across.pixels[last], 10) << side;
+    EXPECT_EQ(across.pixels[last + 1], 0) << side;
   }
 }
 
@@ -97,9 +100,9 @@ TEST(Resize, IsTheSameInBandsAsInOnePiece) {
     for (std::size_t i = 3; i < image.pixels.size() && !opaque; i += 4) {
       image.pixels[i] = static_cast<std::uint8_t>(i % 256);
     }
-    for (const bool repeat : {false, true}) {
+    for (const TextureWrap& wrap : {TextureWrap{}, kWrapRepeat}) {
       for (const auto& [width, height] : {std::pair{16U, 32U}, {128U, 64U}, {61U, 1U}}) {
-        const ResampleOptions options = {repeat, 2};
+        const ResampleOptions options = {wrap, 2};
         const RgbaImage whole = to_srgb(resample(to_linear(image), width, height, options));
         EXPECT_EQ(resize(image, width, height, options).pixels, whole.pixels) << width;
       }

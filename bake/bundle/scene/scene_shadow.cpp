@@ -44,15 +44,13 @@ const LevelRecord& level_at(const BundleContent& content, const ChunkRecord& chu
 /// A texture's alpha, at a level that a soft shadow needs.
 struct AlphaMask {
   RgbaImage image;  ///< empty: opaque
-  std::array<Wrap, 2> wrap{};
+  TextureWrap wrap{};
 
   [[nodiscard]] double at(const glm::dvec2& uv) const {
     if (image.pixels.empty()) return 1;
     const auto texel = [](double x, std::uint32_t side, Wrap along) {
-      double place = std::clamp(x, 0.0, 1.0);
-      if (along == Wrap::kRepeat) place = x - std::floor(x);
-      if (along == Wrap::kMirror) place = std::fabs(x - 2 * std::round(x / 2));
-      return std::min(static_cast<std::uint32_t>(place * side), side - 1);
+      const auto place = static_cast<std::int64_t>(std::floor(x * side));
+      return static_cast<std::size_t>(wrapped(place, side, along));
     };
     const std::size_t row = texel(uv.y, image.height, wrap[1]);
     return image.pixels[4 * (row * image.width + texel(uv.x, image.width, wrap[0]))] / 255.0;

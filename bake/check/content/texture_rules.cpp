@@ -184,7 +184,7 @@ class MipPair {
         blocks_(bundle, texture, level) {
     const TextureRecord& record = bundle.textures()[texture];
     alpha_ = (record.flags & kTextureAlpha) != 0;
-    half_ = resize(finer, image.width, image.height, {filters_across(record.flags), 1});
+    half_ = resize(finer, image.width, image.height, {texture_wrap(record.flags), 1});
     means_ = alpha_ ? half_ : means(finer, image.width, image.height);
     const auto format = static_cast<TextureFormat>(record.format);
     again_ =

@@ -26,16 +26,8 @@ struct ShadedVertex {
   glm::dvec4 colour{1.0};
 };
 
-std::int64_t wrapped(std::int64_t x, std::int64_t size, Wrap wrap) {
-  if (wrap == Wrap::kClamp) return std::clamp<std::int64_t>(x, 0, size - 1);
-  const std::int64_t period = wrap == Wrap::kMirror ? 2 * size : size;
-  x = (x % period + period) % period;
-  return std::min(x, 2 * size - 1 - x);
-}
-
 /// Texel of a level, wrapped or clamped.
-glm::dvec4 texel(const RgbaImage& image, std::int64_t x, std::int64_t y,
-                 const std::array<Wrap, 2>& wrap) {
+glm::dvec4 texel(const RgbaImage& image, std::int64_t x, std::int64_t y, const TextureWrap& wrap) {
   x = wrapped(x, std::int64_t{image.width}, wrap[0]);
   y = wrapped(y, std::int64_t{image.height}, wrap[1]);
   const std::uint8_t* p = image.pixels.data() + 4 * (static_cast<std::size_t>(y) * image.width +
@@ -43,7 +35,7 @@ glm::dvec4 texel(const RgbaImage& image, std::int64_t x, std::int64_t y,
   return glm::dvec4(p[0], p[1], p[2], p[3]) / 255.0;
 }
 
-glm::dvec4 bilinear(const RgbaImage& image, const glm::dvec2& uv, const std::array<Wrap, 2>& wrap) {
+glm::dvec4 bilinear(const RgbaImage& image, const glm::dvec2& uv, const TextureWrap& wrap) {
   const double x = uv.x * image.width - 0.5;
   const double y = uv.y * image.height - 0.5;
   const auto left = static_cast<std::int64_t>(std::floor(x));
@@ -82,7 +74,7 @@ Result<std::vector<SoftTexture>> load_textures(const TriMesh& mesh, unsigned job
     if (mesh.uvs.empty() || mesh.materials[m].diffuse_map.empty()) continue;
     MODAR_ASSIGN(const RgbaImage image, read_texture(mesh.materials[m].diffuse_map));
     textures[m].wrap = texture_wrap(repeats[m]);
-    textures[m].levels = mip_chain(image, filters_across(repeats[m]), jobs);
+    textures[m].levels = mip_chain(image, textures[m].wrap, jobs);
   }
   return textures;
 }

@@ -22,7 +22,7 @@ namespace modar {
 /// A material's picture as mip levels; no levels: it has none.
 struct SoftTexture {
   std::vector<RgbaImage> levels;
-  std::array<Wrap, 2> wrap{};  ///< along u, v
+  TextureWrap wrap{};
 };
 
 /// Uncompressed pictures of all materials, at their own size. Errors: those of read_image().

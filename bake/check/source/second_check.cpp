@@ -46,7 +46,7 @@ glm::dvec3 on_white(const glm::dvec4& colour) {
 }
 
 void add_material(Look& look, const glm::dvec4& colour, const glm::dvec3& emission,
-                  RgbaImage picture, const std::array<Wrap, 2>& wrap) {
+                  RgbaImage picture, const TextureWrap& wrap) {
   SourceMaterial& material = look.mesh.materials.emplace_back();
   material.diffuse = glm::vec3(on_white(colour));
   material.emission = glm::vec3(emission);
@@ -58,7 +58,7 @@ void add_material(Look& look, const glm::dvec4& colour, const glm::dvec3& emissi
     for (int c = 0; c < 3; ++c) p[c] = static_cast<std::uint8_t>(std::lround(255 * paper[c]));
     p[3] = 255;
   }
-  texture.levels = mip_chain(picture, wrap[0] == Wrap::kRepeat, 1);
+  texture.levels = mip_chain(picture, wrap);
   texture.wrap = wrap;
 }
 

@@ -19,8 +19,8 @@ namespace modar {
 struct SecondMaterial {
   glm::dvec4 colour{229.0 / 255, 229.0 / 255, 229.0 / 255, 1};
   glm::dvec3 emission{0};
-  std::array<Wrap, 2> wrap{Wrap::kRepeat, Wrap::kRepeat};  ///< along u, v
-  RgbaImage picture;                                       ///< without pixels: none
+  TextureWrap wrap = kWrapRepeat;
+  RgbaImage picture;  ///< without pixels: none
 };
 
 struct SecondCorner {

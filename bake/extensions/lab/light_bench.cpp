@@ -142,7 +142,7 @@ class LightStage {
     MODAR_TRY(plain_->resize(options_.width, options_.height));
     MODAR_ASSIGN(const RgbaImage print, read_image(options_.pattern));
     const PatternRecord& pattern = bundle_.patterns()[0];
-    ground_.print.levels = mip_chain(print, false, options_.jobs);
+    ground_.print.levels = mip_chain(print, {}, options_.jobs);
     ground_.half_width = static_cast<double>(pattern.half_width);
     ground_.half_height = static_cast<double>(pattern.half_height);
     ground_.table = srgb_to_linear(kTable);

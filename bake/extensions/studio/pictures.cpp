@@ -44,7 +44,7 @@ RgbaImage no_larger(RgbaImage image, std::uint32_t side) {
   const auto scaled = [&](std::uint32_t length) {
     return static_cast<std::uint32_t>(std::max(1.0, std::round(1.0 * length * side / longest)));
   };
-  return resize(image, scaled(image.width), scaled(image.height), {false, cores()});
+  return resize(image, scaled(image.width), scaled(image.height), {{}, cores()});
 }
 
 std::string text_of(const std::vector<std::byte>& bytes) {

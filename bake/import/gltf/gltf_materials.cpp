@@ -365,6 +365,7 @@ class MaterialReader {
     }
     m.normal.path = image_path(info.index);
     m.normal.scale = static_cast<float>(info.scale);
+    m.normal.wrap = texture_wrap(beyond(info.index));
     if (colour.offset != normal.offset || colour.scale != normal.scale ||
         colour.rotation != normal.rotation) {
       m.normal.uv = matrix_of(normal) * glm::inverse(to_colour);

@@ -18,7 +18,7 @@ Result<RgbaImage> read_as_large(const std::string& path, const RgbaImage& other)
   if (path.empty()) return RgbaImage();
   MODAR_ASSIGN(RgbaImage image, read_texture(path));
   if (image.width == other.width && image.height == other.height) return image;
-  return resize(image, other.width, other.height, {.repeat = true});
+  return resize(image, other.width, other.height, {.wrap = kWrapRepeat});
 }
 
 /// Linear light of each value.

@@ -265,7 +265,7 @@ Result<Pages> draw_pages(const TriMesh& mesh, const Plan& plan, const TextureUse
     pages.images.push_back({size.width, size.height, std::vector<std::uint8_t>(4 * texels, 255)});
     pages.shown.push_back(make_coverage(size.width, size.height));
   }
-  const ResampleOptions resample = {false, options.textures.jobs};
+  const ResampleOptions resample = {{}, options.textures.jobs};
   for (std::uint32_t s = 0; s < plan.sheets.size(); ++s) {
     const Sheet& sheet = plan.sheets[s];
     const AtlasSize size = sheet.scaled(plan.step);

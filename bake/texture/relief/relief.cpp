@@ -71,7 +71,8 @@ class NormalField {
  public:
   /// texels: of the map that one texel of the picture spans, across and down. Means of vectors:
   /// what light sees of a patch is nearly what their mean does.
-  NormalField(const RgbaImage& map, glm::dvec2 texels, float scale) {
+  NormalField(const RgbaImage& map, glm::dvec2 texels, const NormalMap& normal)
+      : wrap_(normal.wrap) {
     const auto step = [](double span, std::uint32_t side) {
       return static_cast<std::uint32_t>(
           std::clamp(std::floor(span + 1e-6), 1.0, static_cast<double>(side)));
@@ -94,7 +95,7 @@ class NormalField {
         // 128 is straight on: exporters write it, and 127.5 is no byte.
         const glm::vec3 mean = sum / float(across * down);
         vectors_[std::size_t{y} * width_ + x] =
-            glm::vec3(scale, scale, 1.0F) * (mean - 128.0F) / 127.0F;
+            glm::vec3(normal.scale, normal.scale, 1.0F) * (mean - 128.0F) / 127.0F;
       }
     }
   }
@@ -105,24 +106,27 @@ class NormalField {
                        [](const glm::vec3& v) { return v.x == 0 && v.y == 0; });
   }
 
-  /// Between its four neighbours; the map repeats.
+  /// Between its four neighbours.
   [[nodiscard]] glm::vec3 at(glm::dvec2 uv) const {
-    const auto [x0, x1, fx] = neighbours(uv.x, width_);
-    const auto [y0, y1, fy] = neighbours(uv.y, height_);
+    const auto [x0, x1, fx] = neighbours(uv.x, width_, wrap_[0]);
+    const auto [y0, y1, fy] = neighbours(uv.y, height_, wrap_[1]);
     const auto vector = [&](std::size_t x, std::size_t y) { return vectors_[y * width_ + x]; };
     return glm::mix(glm::mix(vector(x0, y0), vector(x1, y0), fx),
                     glm::mix(vector(x0, y1), vector(x1, y1), fx), fy);
   }
 
  private:
-  static std::tuple<std::size_t, std::size_t, float> neighbours(double at, std::uint32_t side) {
-    const double texel = (at - std::floor(at)) * side - 0.5;
+  static std::tuple<std::size_t, std::size_t, float> neighbours(double at, std::uint32_t side,
+                                                                Wrap wrap) {
+    const double texel = at * side - 0.5;
     const double low = std::floor(texel);
-    const auto first = static_cast<std::size_t>(low < 0 ? side - 1.0 : low);
-    return {std::min<std::size_t>(first, side - 1), (first + 1) % side,
+    const auto first = static_cast<std::int64_t>(low);
+    return {static_cast<std::size_t>(wrapped(first, side, wrap)),
+            static_cast<std::size_t>(wrapped(first + 1, side, wrap)),
             static_cast<float>(texel - low)};
   }
 
+  TextureWrap wrap_;
   std::uint32_t width_ = 0;
   std::uint32_t height_ = 0;
   std::vector<glm::vec3> vectors_;
@@ -293,6 +297,14 @@ class ReliefRows {
     glm::dvec2 high = glm::max(glm::max(uv.corners[0], uv.corners[1]), uv.corners[2]);
     // Also false where a corner is no number.
     if (!(high.x - low.x <= kMostTiles && high.y - low.y <= kMostTiles)) return;
+    const TextureWrap wrap =
+        texture_wrap(mesh_.materials[mesh_.triangle_material[triangle]].beyond);
+    // All that is beyond the edge shows the texels at it, which are shaded as on its inner side.
+    for (int i = 0; i < 2; ++i) {
+      if (wrap[static_cast<std::size_t>(i)] != Wrap::kClamp) continue;
+      low[i] = 0;
+      high[i] = 0;
+    }
     const glm::dvec2 tile = glm::floor(low);
     const auto columns = static_cast<std::int64_t>(std::floor(high.x) - tile.x);
     const auto rows = static_cast<std::int64_t>(std::floor(high.y) - tile.y);
@@ -302,18 +314,27 @@ class ReliefRows {
         const auto number =
             static_cast<std::uint32_t>(triangle + static_cast<std::size_t>(x + 257 * y));
         if ((number * 2654435761U >> 8) % every != 0) continue;
-        add_tile(triangle, uv, tile + glm::dvec2(x, y), first, end);
+        add_tile(triangle, uv, tile + glm::dvec2(x, y), wrap, first, end);
       }
     }
   }
 
  private:
   /// The part of a triangle on one repeat of the picture.
-  void add_tile(std::size_t triangle, const UvTriangle& uv, glm::dvec2 tile, std::uint32_t first,
-                std::uint32_t end) {
+  void add_tile(std::size_t triangle, const UvTriangle& uv, glm::dvec2 tile,
+                const TextureWrap& wrap, std::uint32_t first, std::uint32_t end) {
     const glm::dvec2 size(sums_.width, sums_.height);
     std::array<glm::dvec2, 3> p;
-    for (std::size_t i = 0; i < 3; ++i) p[i] = (uv.corners[i] - tile) * size - 0.5;
+    for (std::size_t i = 0; i < 3; ++i) p[i] = uv.corners[i] - tile;
+    double area2 = uv.area2 * size.x * size.y;
+    for (int axis = 0; axis < 2; ++axis) {
+      if (wrap[static_cast<std::size_t>(axis)] != Wrap::kMirror || std::fmod(tile[axis], 2) == 0) {
+        continue;
+      }
+      for (glm::dvec2& corner : p) corner[axis] = 1 - corner[axis];
+      area2 = -area2;
+    }
+    for (glm::dvec2& corner : p) corner = corner * size - 0.5;
     const auto span = [&](int axis, std::uint32_t from, std::uint32_t to) {
       const double least = std::min({p[0][axis], p[1][axis], p[2][axis]});
       const double most = std::max({p[0][axis], p[1][axis], p[2][axis]});
@@ -323,7 +344,6 @@ class ReliefRows {
     const auto [top, bottom] = span(1, first, end);
     const auto [left, right] = span(0, 0, sums_.width);
     if (!(top <= bottom && left <= right)) return;
-    const double area2 = uv.area2 * size.x * size.y;
     const auto cross = [](const glm::dvec2& a, const glm::dvec2& b) {
       return a.x * b.y - a.y * b.x;
     };
@@ -438,7 +458,7 @@ RgbaImage white_picture(const RgbaImage& map, std::uint32_t max_side) {
 /// The colours that relief is drawn on: white if none. As large as the normal map
 /// where that is larger; else unchanged; no side above `max_side`.
 Result<RgbaImage> read_colours(const ReliefGroup& group, const RgbaImage& map,
-                               const ReliefOptions& options) {
+                               const ReliefOptions& options, std::uint32_t beyond) {
   if (group.colour.empty()) return white_picture(map, options.max_side);
   MODAR_ASSIGN(RgbaImage image, read_texture(group.colour));
   const glm::dvec2 span = spanned(map, group.normal, image);
@@ -448,8 +468,7 @@ Result<RgbaImage> read_colours(const ReliefGroup& group, const RgbaImage& map,
     return static_cast<std::uint32_t>(std::max(1.0, std::round(whole * scale)));
   };
   if (scale == 1.0) return image;
-  return resize(image, side(image.width), side(image.height),
-                {.repeat = true, .jobs = options.jobs});
+  return resize(image, side(image.width), side(image.height), {texture_wrap(beyond), options.jobs});
 }
 
 /// Draws one group's picture; nothing where its map is flat.
@@ -462,8 +481,9 @@ class ReliefPainter {
   Result<bool> paint(const ReliefGroup& group, const Tangents& tangents, RgbaImage& image,
                      float& headroom) const {
     MODAR_ASSIGN(const RgbaImage map, read_normals(group.normal));
-    MODAR_ASSIGN(image, read_colours(group, map, options_));
-    const NormalField field(map, spanned(map, group.normal, image), group.normal.scale);
+    const std::uint32_t beyond = mesh_.materials[group.materials.front()].beyond;
+    MODAR_ASSIGN(image, read_colours(group, map, options_, beyond));
+    const NormalField field(map, spanned(map, group.normal, image), group.normal);
     if (field.flat()) return false;
     const std::vector<std::uint32_t> triangles = triangles_of(group);
     double repeats = 0;
