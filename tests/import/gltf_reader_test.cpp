@@ -281,6 +281,18 @@ TEST_F(Gltf, RequiredExtensionsAreReadOrRefusedByName) {
             "for another pose, apply it to the model and export it again");
 }
 
+TEST_F(Gltf, AnEmptyPictureIsReportedAndRefusesNothing) {
+  const auto model = read(
+      std::string(kOneTriangle) +
+          R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],)"
+          R"("nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}],"textures":[{"source":0}],)"
+          R"("images":[{"uri":"data:image/png;base64,"}],)"
+          R"("materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}])",
+      one_triangle());
+  ASSERT_TRUE(model) << to_line(model.error());
+  EXPECT_FALSE(read_image(model->materials[0].diffuse_map)) << "the bake says so";
+}
+
 TEST_F(Gltf, GlassAndGlossinessHaveTheCoresNearest) {
   const std::string gloss = R"({"extensions":{"KHR_materials_pbrSpecularGlossiness":{)";
   const auto model = read(

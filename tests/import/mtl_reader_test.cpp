@@ -226,10 +226,50 @@ TEST_F(MtlReader, MaterialsAreWhatExportersMean) {
     EXPECT_EQ(each.ambient, glm::vec3(0.9f, 0.2f, 0.1f)) << each.name;
   }
   ASSERT_EQ(findings_.size(), 1u);
-  EXPECT_EQ(findings_[0].id, "mtl.opacity-map");
-  EXPECT_TRUE(
-      parse_mtl(std::string("\xFF\xFEn\0e\0", 6), folder_.string(), "m.mtl", findings_).empty());
-  EXPECT_EQ(findings_.back().id, "mtl.utf16");
+  EXPECT_EQ(findings_[0].id, "mtl.opacity-map") << "wood.jpg is no picture";
+}
+
+TEST_F(MtlReader, AMapOfOpacityCutsOutTheColour) {
+  ASSERT_TRUE(write_png({2, 1, {10, 20, 30, 255, 40, 50, 60, 255}}, (folder_ / "c.png").string()));
+  ASSERT_TRUE(write_png({2, 1, {0, 0, 0, 255, 255, 255, 255, 255}}, (folder_ / "d.png").string()));
+  ASSERT_TRUE(write_png({2, 1, {255, 255, 255, 255, 9, 9, 9, 64}}, (folder_ / "a.png").string()));
+  const auto m = parse(
+      "newmtl both\nKd 0.8 0.8 0.8\nmap_Kd c.png\nmap_d d.png\nnewmtl alone\nKd 0.2 0.6 0.2\n"
+      "map_d d.png\nnewmtl alpha\nmap_Kd c.png\nmap_d a.png\nnewmtl one\nmap_Kd a.png\nmap_d "
+      "a.png\n");
+  ASSERT_EQ(m.size(), 4u);
+  EXPECT_TRUE(findings_.empty());
+  const auto pixels = [](const SourceMaterial& material) {
+    const auto image = read_image(material.diffuse_map);
+    return image ? image->pixels : std::vector<std::uint8_t>();
+  };
+  using Pixels = std::vector<std::uint8_t>;
+  EXPECT_EQ(pixels(m[0]), (Pixels{10, 20, 30, 0, 40, 50, 60, 255}));
+  EXPECT_EQ(m[1].diffuse, glm::vec3(0.2f, 0.6f, 0.2f));
+  EXPECT_EQ(pixels(m[1]), (Pixels{255, 255, 255, 0, 255, 255, 255, 255}));
+  EXPECT_EQ(pixels(m[2]), (Pixels{10, 20, 30, 255, 40, 50, 60, 64}));
+  EXPECT_EQ(fs::path(m[3].diffuse_map).filename(), "a.png");
+}
+
+TEST_F(MtlReader, Utf16IsText) {
+  const std::u16string text = u"newmtl K\u00e4\U0001F600\nKd 0.2 0.6 0.2\n";
+  for (const bool big : {false, true}) {
+    std::string bytes = big ? "\xFE\xFF" : "\xFF\xFE";
+    for (const char16_t unit : text) {
+      const auto high = static_cast<char>(unit >> 8);
+      const auto low = static_cast<char>(unit & 0xFF);
+      bytes += big ? std::string{high, low} : std::string{low, high};
+    }
+    const auto m = parse_mtl(bytes, folder_.string(), "m.mtl", findings_);
+    ASSERT_EQ(m.size(), 1u);
+    EXPECT_EQ(m[0].name, "K\xC3\xA4\xF0\x9F\x98\x80");
+    EXPECT_EQ(m[0].diffuse, glm::vec3(0.2f, 0.6f, 0.2f));
+    std::ofstream(folder_ / "w.mtl", std::ios::binary) << bytes;
+    std::ofstream(folder_ / "w.obj") << "mtllib w.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    const auto model = read_model((folder_ / "w.obj").string(), {});
+    ASSERT_TRUE(model);
+    EXPECT_EQ(model->materials[0].diffuse, m[0].diffuse) << "the first one, as no face names one";
+  }
 }
 
 TEST_F(MtlReader, MapsAreScaledAndShiftedAsWritten) {

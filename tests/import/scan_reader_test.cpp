@@ -284,6 +284,66 @@ TEST(Ply, FacesHaveColoursAndTextIsAnElementALine) {
   EXPECT_EQ(floats->colours[1], glm::vec3(1.0f, 0.0f, 0.2f));
 }
 
+TEST(Ply, ALineThatIsTooShortSpoilsOneElement) {
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 3\nproperty list uchar int vertex_indices\nend_header\n";
+  const std::string vertices = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+  const std::string faces = "3 0 1 2\n4 0 1 2\n3 0 2 3\n";
+  for (const std::string end : {"\n", "\r\n", "\r"}) {
+    std::string text = header + vertices + faces;
+    for (std::size_t i = 0; (i = text.find('\n', i)) != std::string::npos; i += end.size()) {
+      text.replace(i, 1, end);
+    }
+    const auto read = parse_ply(text, "a.ply");
+    ASSERT_TRUE(read) << to_line(read.error());
+    EXPECT_EQ(read->face_count(), 2u);
+    EXPECT_EQ(read->lost_faces, 1u);
+    EXPECT_EQ(read->corner_positions[5], 3u);
+  }
+  // A vertex with a number too few is named, and not the file's last line.
+  const auto vertex = parse_ply(header + "0 0 0\n1 0\n1 1 0\n0 1 0\n" + faces, "a.ply");
+  ASSERT_FALSE(vertex);
+  EXPECT_NE(vertex.error().cause.find("at vertex 1 of 4"), std::string::npos)
+      << vertex.error().cause;
+}
+
+TEST(Ply, ColoursAndPicturesAreThoseThatProgramsMean) {
+  const auto read = [](const std::string& type, const std::string& colour, const std::string& faces,
+                       const std::string& face_lines) {
+    const std::string channels =
+        "property " + type + " red\nproperty " + type + " green\nproperty " + type + " blue\n";
+    return parse_ply(
+        "ply\nformat ascii 1.0\ncomment TextureFile none.png\nelement vertex 3\nproperty float x\n"
+        "property float y\n" +
+            channels + "element face 2\nproperty list uchar int vertex_indices\n" + faces +
+            "end_header\n0 0 " + colour + "\n1 0 " + colour + "\n0 1 " + colour + "\n" + face_lines,
+        "a.ply");
+  };
+  const std::string plain = "3 0 1 2\n3 2 1 0\n";
+  for (const auto& [type, colour] :
+       {std::pair("ushort", "65535 0 13107"), {"ushort", "255 0 51"}}) {
+    const auto model = read(type, colour, "", plain);
+    ASSERT_TRUE(model) << to_line(model.error());
+    EXPECT_NEAR(model->colours[0].x, 1, 1e-3) << colour;
+    EXPECT_NEAR(model->colours[0].z, 0.2, 1e-3) << colour;
+  }
+  // Faces' colours are seen where all vertices have one, which MeshLab writes by itself.
+  const auto faces = read("uchar", "255 255 255",
+                          "property uchar red\nproperty uchar green\nproperty uchar blue\n",
+                          "3 0 1 2 255 0 0\n3 2 1 0 0 0 255\n");
+  ASSERT_TRUE(faces) << to_line(faces.error());
+  EXPECT_EQ(faces->colours[faces->corner_positions[0]], glm::vec3(1, 0, 0));
+  EXPECT_EQ(faces->colours[faces->corner_positions[3]], glm::vec3(0, 0, 1));
+  // MeshLab's faces without a picture.
+  const auto bare = read("uchar", "1 2 3", "property int texnumber\n", "3 0 1 2 0\n3 2 1 0 -1\n");
+  ASSERT_TRUE(bare) << to_line(bare.error());
+  ASSERT_EQ(bare->material_runs.size(), 2u);
+  EXPECT_EQ(bare->material_runs[1].value, 1u);
+  ASSERT_EQ(bare->materials.size(), 2u);
+  EXPECT_EQ(bare->materials[1].diffuse, SourceMaterial().diffuse);
+}
+
 TEST(Ply, RefusesWhatIsNone) {
   const std::string header =
       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
@@ -320,12 +380,16 @@ TEST(Ply, RefusesWhatIsNone) {
   ASSERT_FALSE(points);
   EXPECT_EQ(points.error().code, "ply.no-faces");
   EXPECT_NE(points.error().cure.find("mesh the point cloud"), std::string::npos);
-  const auto splat = parse_ply(
-      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float f_dc_0\n"
-      "property float scale_0\nproperty float rot_0\nend_header\n0 0 0 0\n",
-      "a.ply");
-  ASSERT_FALSE(splat);
-  EXPECT_NE(splat.error().cure.find("Gaussian splat"), std::string::npos);
+  for (const std::string names : {"float f_dc_0\nproperty float scale_0\nproperty float rot_0",
+                                  "uint packed_position\nproperty uint packed_rotation\n"
+                                  "property uint packed_scale"}) {
+    const auto splat =
+        parse_ply("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty " + names +
+                      "\nend_header\n0 0 0 0\n",
+                  "a.ply");
+    ASSERT_FALSE(splat);
+    EXPECT_NE(splat.error().cure.find("Gaussian splat"), std::string::npos);
+  }
 }
 
 }  // namespace

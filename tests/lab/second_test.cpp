@@ -153,6 +153,25 @@ TEST_F(SecondTest, GoodBundlesDifferInNothing) {
   }
 }
 
+TEST_F(SecondTest, ColoursAreReadAsTheBakeReadsThem) {
+  const std::string bytes = "v 0 0 0 200 40 30\nv 1 0 0 200 40 30\nv 0 1 0 20 40 230\nf 1 2 3\n";
+  const std::string alpha =
+      "v 0 0 0 0.8 0.2 0.1 1\nv 1 0 0 0.8 0.2 0.1 1\nv 0 1 0 0.1 0.2 0.9 1\nf 1 2 3\n";
+  write("words.mtl", replaced(replaced(kMtl, "Kd 0.8", "Kd 0.8 0.1 0.1\nKd spectral 0.8"), "map_Kd",
+                              "Kd xyz 0.5 0.5 0.5\nmap_Kd"));
+  const std::string unlit = replaced(
+      kGltf, R"("metallicFactor":0,"baseColorTexture":{"index":0}})",
+      R"("metallicFactor":0,"baseColorFactor":[0.6,0.02,0.01,1]},"extensions":{"KHR_materials_unlit":{}})");
+  for (const auto& [name, text] :
+       std::map<std::string, std::string>{{"bytes.obj", bytes},
+                                          {"alpha.obj", alpha},
+                                          {"unlit.gltf", unlit},
+                                          {"words.obj", replaced(kObj, "box.mtl", "words.mtl")}}) {
+    const std::string path = write(name, text);
+    EXPECT_EQ(issues(path, path), Ids()) << name << details_;
+  }
+}
+
 TEST_F(SecondTest, PolygonsThatGoAroundAgainAreOneRound) {
   const std::string path =
       write("again.obj", replaced(kObj, "f 4 3 2 1\n", "f 4 3 2 1 4 3 2 1 4 3 2 1 4\n"));

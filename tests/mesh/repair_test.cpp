@@ -268,8 +268,8 @@ TEST(Repair, KeepsIslandsThatAreMuchOfTheModel) {
 }
 
 /// A table with a cylinder on it as a scanner sees them from above, turned; inside: the cylinder's
-/// triangles.
-Shape scan(double noise, double height, std::vector<bool>& inside) {
+/// triangles. two: instead of it two blocks of which one corner each is next to one place.
+Shape scan(double noise, double height, std::vector<bool>& inside, bool two = false) {
   constexpr int kSide = 80;
   Shape shape;
   std::uint32_t seed = 1;
@@ -277,7 +277,10 @@ Shape scan(double noise, double height, std::vector<bool>& inside) {
   for (int x = 0; x < kSide; ++x) {
     for (int y = 0; y < kSide; ++y) {
       seed = seed * 1664525 + 1013904223;
-      high.push_back(std::hypot(x - 35, y - 42) < 12);
+      const auto block = [&](int from_x, int from_y) {
+        return x >= from_x && x < from_x + 16 && y >= from_y && y < from_y + 16;
+      };
+      high.push_back(two ? block(20, 27) || block(37, 44) : std::hypot(x - 35, y - 42) < 12);
       const double z = (high.back() ? height : 0) + noise * (seed / 4294967296.0 - 0.5);
       shape.at(0.8 * x - 0.6 * z, y, 0.6 * x + 0.8 * z);
     }
@@ -321,6 +324,16 @@ TEST(Repair, RemovesTheTableThatAScanIsOn) {
     const double square = 79 * 79 - static_cast<double>(kept) / 2;
     EXPECT_NEAR(result.done.of(Defect::kSupport).area, square, 1e-6);
   }
+}
+
+TEST(Repair, WhatStoodOnTheTableIsManifoldWithoutIt) {
+  std::vector<bool> inside;
+  Repaired result = repair(scan(0, 30, inside, true), true);
+  EXPECT_EQ(result.repaired(Defect::kSupport), 1u);
+  EXPECT_EQ(result.mesh.triangles.size(),
+            static_cast<std::size_t>(std::count(inside.begin(), inside.end(), true)));
+  EXPECT_EQ(result.repaired(Defect::kVertex), 1u);
+  expect_clean(result);
 }
 
 TEST(Repair, KeepsModelsThatAreOnNothing) {

@@ -514,6 +514,11 @@ void call_data_bytes(std::string& json) {
     plain.append(json, done, type - done);
     plain += "application/octet-stream";
     done = end;
+    // Nothing at all would refuse the file; a byte is no picture, which is reported.
+    if (json.compare(end + kEnd.size(), 1, "\"") == 0) {
+      plain.append(kEnd).append("AA==");
+      done = end + kEnd.size();
+    }
   }
   if (done != 0) json = plain.append(json, done, std::string::npos);
 }

@@ -14,6 +14,7 @@
 #include <fast_float/fast_float.h>
 
 #include "bake/image/image.hpp"
+#include "bake/image/resample.hpp"
 #include "bake/import/name_form.hpp"
 #include "bake/import/obj/map_places.hpp"
 #include "bake/import/obj/number_parser.hpp"
@@ -21,7 +22,10 @@
 #include "bake/import/reflection.hpp"
 #include "bake/import/texture_by_name.hpp"
 #include "bake/io/input.hpp"
+#include "bake/process/process.hpp"
 #include "formats/base/colour.hpp"
+#include "formats/base/path.hpp"
+#include "formats/base/ranges.hpp"
 #include "formats/base/utf8.hpp"
 
 namespace modar {
@@ -196,7 +200,12 @@ void note_place(const std::string& name, const std::string& path, const ModelFol
   const fs::path base = fs::path(folder.path).lexically_normal();
   const fs::path found = fs::path(path).lexically_normal();
   const fs::path wanted = (base / percent_decoded(cleaned(name))).lexically_normal();
-  if (name_form(wanted.string()) == name_form(found.string())) return;
+  const std::string stated = name_form((base / cleaned(name)).lexically_normal().string());
+  if (ranges::any_of(std::array{name_form(wanted.string()), stated}, [&](const std::string& known) {
+        return known == name_form(found.string());
+      })) {
+    return;
+  }
   const fs::path relative = found.lexically_relative(base);
   diagnostics.push_back({"model.found-elsewhere", DiagnosticSeverity::kInfo, label, line,
                          "'" + short_name(name) + "' is read from '" + relative.string() + "'",
@@ -329,6 +338,29 @@ bool is_gray(const glm::vec3& ka) {
   return most - least <= 0.05f * most;
 }
 
+/// A picture with the brightness of another, or that one's alpha if it has some, as its alpha.
+/// colour: empty: white.
+Result<RgbaImage> with_opacity(const std::string& colour, const std::string& opacity) {
+  MODAR_ASSIGN(RgbaImage mask, read_texture(opacity, Colours::kStored));
+  bool opaque = true;
+  for (std::size_t i = 3; i < mask.pixels.size(); i += 4) opaque = opaque && mask.pixels[i] == 255;
+  RgbaImage picture = {mask.width, mask.height, std::vector<std::uint8_t>(mask.pixels.size(), 255)};
+  if (!colour.empty()) {
+    MODAR_ASSIGN(picture, read_texture(colour));
+    mask = resize(mask, picture.width, picture.height, {kWrapRepeat, 1});
+  }
+  for (std::size_t i = 0; i < picture.pixels.size(); i += 4) {
+    const std::uint8_t* m = &mask.pixels[i];
+    const int alpha = opaque ? (m[0] + m[1] + m[2]) / 3 : m[3];
+    picture.pixels[i + 3] = static_cast<std::uint8_t>(picture.pixels[i + 3] * alpha / 255);
+  }
+  return picture;
+}
+
+struct KeptMaps {
+  TemporaryFolder folder;
+};
+
 /// What a material's statements say together. Pr and Pm are the roughness and metalness that
 /// Blender and others write; without them, what has a highlight reflects as all dielectrics do, or
 /// as much as Ks says where the illumination model has reflection (illum 3 and 5).
@@ -358,10 +390,6 @@ struct MtlStatements {
       m.diffuse_map = map;
       m.place = other_place;
     }
-    if (!m.alpha_map.empty() && m.alpha_map != m.diffuse_map) {
-      note("mtl.opacity-map", "has a map of opacity of its own, which is left out",
-           "put it into the alpha channel of the picture that map_Kd names");
-    }
     const glm::vec3 kd = m.diffuse;
     const bool gray = std::max({kd.r, kd.g, kd.b}) - std::min({kd.r, kd.g, kd.b}) <= 0.01f;
     if ((gray || !has_kd) && !m.diffuse_map.empty()) {
@@ -387,8 +415,53 @@ struct MtlStatements {
           static_cast<float>(reflects ? std::clamp(luminance(shine.r, shine.g, shine.b), 0.0, most)
                                       : kDielectricReflectance);
     }
+    if (!m.alpha_map.empty() && m.alpha_map != m.diffuse_map) add_opacity(context, m);
+  }
+
+ private:
+  /// Merges the map of opacity into the picture of the colour.
+  static void add_opacity(MtlContext& context, SourceMaterial& m) {
+    const auto kept = std::make_shared<KeptMaps>();
+    const std::string path = kept->folder.path() + "/" + file_stem(m.alpha_map) + ".png";
+    const Result<RgbaImage> picture = with_opacity(m.diffuse_map, m.alpha_map);
+    const Result<void> written =
+        picture ? write_png(*picture, path) : tl::unexpected(picture.error());
+    if (!written) {
+      const Error& error = written.error();
+      context.diagnostics.push_back(
+          {"mtl.opacity-map", DiagnosticSeverity::kWarning, error.where, 0,
+           "material '" + m.name + "' loses its map of opacity: " + error.cause, error.cure});
+      return;
+    }
+    for (const std::string& map : {m.diffuse_map, m.alpha_map, m.normal.path}) {
+      if (context.missing != nullptr && !map.empty()) context.missing->push_back(map);
+    }
+    m.diffuse_map = path;
+    m.alpha_map.clear();
+    m.keeper = kept;
   }
 };
+
+/// UTF-16 text with its byte order mark as UTF-8.
+std::string utf8_of_utf16(std::string_view text) {
+  const bool big = text.starts_with('\xFE');
+  std::string utf8;
+  std::uint32_t high = 0;
+  for (std::size_t i = 2; i + 1 < text.size(); i += 2) {
+    const auto byte = [&](std::size_t at) {
+      return static_cast<std::uint32_t>(static_cast<unsigned char>(text[at]));
+    };
+    std::uint32_t unit = big ? byte(i) << 8u | byte(i + 1) : byte(i + 1) << 8u | byte(i);
+    if (unit >= 0xD800 && unit < 0xDC00) {
+      high = 0x10000 + ((unit & 0x3FFu) << 10u);
+      continue;
+    }
+    if (unit >= 0xDC00 && unit < 0xE000) unit = high == 0 ? 0xFFFD : high + (unit & 0x3FFu);
+    append_utf8(utf8, unit);
+    high = 0;
+  }
+  return utf8;
+}
 
 /// The factor of the option -bm.
 float bump_factor(std::string_view text) {
@@ -448,9 +521,7 @@ std::vector<SourceMaterial> parse_mtl(std::string_view text, const ModelFolder& 
   MtlContext context{folder, label, diagnostics, missing};
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
-    diagnostics.push_back({"mtl.utf16", DiagnosticSeverity::kWarning, label, 0,
-                           "the file is UTF-16 text and is not read", "save it as UTF-8"});
-    return materials;
+    return parse_mtl(utf8_of_utf16(text), folder, label, diagnostics, missing);
   }
   MtlStatements stated;
   std::size_t at = 0;
@@ -621,7 +692,8 @@ void ObjMaterials::resolve(const ModelFolder& folder, const std::string& label, 
     read.push_back(path);
     model.files.push_back(path);
     const Result<std::string> text = read_file(path, kMaxMtlBytes);
-    const bool sound = text && text->find('\0') == std::string::npos;
+    const bool sound = text && (text->find('\0') == std::string::npos ||
+                                text->starts_with("\xFF\xFE") || text->starts_with("\xFE\xFF"));
     if (!sound) {
       const Error error = text ? Error{} : text.error();
       diagnostics.push_back({"obj.unreadable-mtl", DiagnosticSeverity::kWarning, path, 0,

@@ -35,10 +35,11 @@ class HeaderParser {
     const std::string_view all = bytes.substr(0, kMostHeaderBytes);
     bool ended = false;
     while (!ended && header_.bytes < all.size()) {
-      const std::size_t end = all.find('\n', header_.bytes);
+      const std::size_t end = all.find_first_of("\r\n", header_.bytes);
       if (end == std::string_view::npos) break;
+      if (header_.lines == 0) two_bytes_ = all.substr(end).starts_with("\r\n");
       std::string_view line = all.substr(header_.bytes, end - header_.bytes);
-      header_.bytes = end + 1;
+      header_.bytes = end + (two_bytes_ && all[end] == '\r' ? 2 : 1);
       ++header_.lines;
       std::string_view copy = line;
       ended = next_word(copy) == "end_header";
@@ -127,6 +128,7 @@ class HeaderParser {
   const std::string& label_;
   PlyHeader header_;
   bool stated_format_ = false;
+  bool two_bytes_ = false;  // end a line
 };
 
 }  // namespace

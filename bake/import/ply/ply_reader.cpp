@@ -42,10 +42,13 @@ class PlyValues {
       if (!element.properties.empty()) elements += std::min(element.count, kMostElements);
     }
     by_line_ = lines >= elements;
+    strict_ = lines == elements;
   }
 
   [[nodiscard]] std::size_t offset() const { return at_; }
   [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
+  /// Whether each element is a line, so that one fault spoils one.
+  [[nodiscard]] bool strict() const { return strict_; }
   [[nodiscard]] bool text() const { return encoding_ == PlyHeader::Encoding::kText; }
 
   /// Least bytes that an element takes, so that no count is believed beyond the file.
@@ -59,6 +62,7 @@ class PlyValues {
 
   /// After an element: passes over what its line has beyond it. Returns whether there was anything.
   bool end_element() {
+    starts_ = true;
     if (!by_line_) return false;
     bool more = false;
     for (; at_ < bytes_.size() && !is_end(bytes_[at_]); ++at_) more = more || bytes_[at_] > ' ';
@@ -100,7 +104,11 @@ class PlyValues {
     const auto space = [](char c) {
       return c == ' ' || c == '\n' || c == '\r' || c == '\t' || c == '\v' || c == '\f';
     };
-    while (at_ < bytes_.size() && space(bytes_[at_])) ++at_;
+    while (at_ < bytes_.size() && space(bytes_[at_])) {
+      if (strict_ && !starts_ && is_end(bytes_[at_])) return false;
+      ++at_;
+    }
+    starts_ = false;
     std::size_t end = at_;
     while (end < bytes_.size() && !space(bytes_[end])) ++end;
     const std::size_t start = at_ < end && bytes_[at_] == '+' ? at_ + 1 : at_;
@@ -115,6 +123,8 @@ class PlyValues {
   std::size_t at_;
   PlyHeader::Encoding encoding_;
   bool by_line_ = false;
+  bool strict_ = false;  // and there are no other lines
+  bool starts_ = true;   // an element does here
 };
 
 /// What a vertex's property is.
@@ -193,12 +203,14 @@ class PlyReader {
                 "the file is truncated or damaged; copy or export it again");
   }
 
-  /// Colours in [0,1]. Floats beyond are of programs that write 0 to 255.
+  /// Colours in [0,1]. Floats beyond, and 16 bits of which 8 are used, are of programs that write 0
+  /// to 255.
   template <class It>
-  static void finish_colours(It begin, It end) {
+  static void finish_colours(It begin, It end, double stated) {
     float most = 0;
     for (It c = begin; c != end; ++c) most = std::max({most, c->x, c->y, c->z});
-    const float full = most > 2.0f && most <= 255.0f ? 255.0f : 1.0f;
+    float full = most > 2.0f && most <= 255.0f ? 255.0f : 1.0f;
+    if (stated > 255 && most * static_cast<float>(stated) < 255.5f) full = 255.0f / 65535.0f;
     for (It c = begin; c != end; ++c) *c = glm::clamp(*c / full, 0.0f, 1.0f);
   }
 
@@ -251,7 +263,7 @@ class PlyReader {
         model_.colours.push_back(glm::vec3(glm::dvec3(value[9], value[10], value[11]) / full));
       }
     }
-    finish_colours(model_.colours.begin(), model_.colours.end());
+    finish_colours(model_.colours.begin(), model_.colours.end(), full);
     return {};
   }
 
@@ -267,11 +279,11 @@ class PlyReader {
       double texture = 0;
       std::array<double, kRoles> colour{};
       int colours = 0;
+      bool whole = true;
       for (const PlyProperty& property : element.properties) {
         double value = 0;
-        if (!(property.list ? parse_list(property) : values_.take(property.type, value))) {
-          return cut_short(element, i);
-        }
+        whole = property.list ? parse_list(property) : values_.take(property.type, value);
+        if (!whole) break;
         if (property.list &&
             (property.name == "vertex_indices" || property.name == "vertex_index")) {
           corners.swap(list_);
@@ -286,6 +298,8 @@ class PlyReader {
       }
       // MeshLab's header calls lists of corners' colours single ones.
       colours_fit_ = !values_.end_element() && colours_fit_;
+      if (!whole && !values_.strict()) return cut_short(element, i);
+      if (!whole) corners.clear();
       if (!faces) continue;
       if (strips) {
         add_strip(corners);
@@ -309,8 +323,10 @@ class PlyReader {
       ++left_out_;
       return;
     }
-    const auto material = static_cast<std::uint32_t>(std::clamp(
-        texture, 0.0, static_cast<double>(std::max<std::size_t>(header_.textures.size(), 1) - 1)));
+    const auto last = static_cast<double>(std::max<std::size_t>(header_.textures.size(), 1) - 1);
+    // MeshLab's -1: no picture, which is the material behind those of the pictures.
+    const auto material = static_cast<std::uint32_t>(
+        texture < 0 && !header_.textures.empty() ? last + 1 : std::clamp(texture, 0.0, last));
     if (model_.material_runs.empty() || model_.material_runs.back().value != material) {
       model_.material_runs.push_back({faces_, material});
     }
@@ -330,8 +346,13 @@ class PlyReader {
 
   /// Gives the corners of faces with a colour positions of that colour.
   void colour_faces() {
-    if (face_colours_.size() != faces_ || !colours_fit_ || !model_.colours.empty()) return;
-    finish_colours(face_colours_.begin(), face_colours_.end());
+    const auto vary = [](const auto& colours) {
+      return ranges::any_of(colours, [&](const glm::vec3& c) { return c != colours[0]; });
+    };
+    if (face_colours_.size() != faces_ || !colours_fit_ || vary(model_.colours)) return;
+    if (!model_.colours.empty() && !vary(face_colours_)) return;
+    model_.colours = Array<glm::vec3>();
+    finish_colours(face_colours_.begin(), face_colours_.end(), 1);
     const Array<glm::dvec3> positions = std::move(model_.positions);
     const Array<glm::dvec2> uvs = std::move(model_.uvs);
     const Array<glm::vec3> normals = std::move(model_.normals);
@@ -376,7 +397,7 @@ class PlyReader {
         return ranges::any_of(element.properties,
                               [&](const PlyProperty& p) { return p.name == name; });
       };
-      return (has("scale_0") && has("rot_0")) || has("f_dc_0");
+      return (has("scale_0") && has("rot_0")) || has("f_dc_0") || has("packed_rotation");
     });
   }
 
@@ -400,8 +421,8 @@ class PlyReader {
     if (left_out_ != 0) {
       model_.diagnostics.push_back({"ply.left-out", DiagnosticSeverity::kWarning, label_, 0,
                                     std::to_string(left_out_) +
-                                        " faces have fewer than three corners or name vertices "
-                                        "that do not exist",
+                                        " faces have fewer than three corners, lack numbers or "
+                                        "name vertices that do not exist",
                                     "they are left out; export the model again"});
     }
     colour_faces();
@@ -451,8 +472,11 @@ void add_materials(const PlyHeader& header, const ModelFolder& folder, const std
                                          "texture '" + statement + "'", material.name, folder,
                                          "put it into the model's folder"));
   }
-  if (!model.materials.empty()) return;
+  const auto plain = ranges::any_of(
+      model.material_runs, [&](const auto& run) { return run.value >= model.materials.size(); });
+  if (!model.materials.empty() && !plain) return;
   model.materials.emplace_back();
+  if (!header.textures.empty()) return;
   assign_texture_by_name(folder, label, own_picture, model);
 }
 

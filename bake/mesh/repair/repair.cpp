@@ -97,7 +97,9 @@ MeshDefects repair_model(SourceModel& model, bool support, Report& report) {
   join_seams(triangles);
   remove_repeated(triangles, defects.of(Defect::kDuplicate));
   make_manifold(triangles, defects);
-  if (support && !remove_support(triangles, defects.of(Defect::kSupport))) {
+  if (support && remove_support(triangles, defects.of(Defect::kSupport))) {
+    make_manifold(triangles, defects);  // its objects may touch now
+  } else if (support) {
     report.diagnostics.push_back({"model.no-support", DiagnosticSeverity::kWarning, model.name, 0,
                                   "no flat surface with an open border is under the model",
                                   "cut it off in an editor, or leave out --repair-support"});

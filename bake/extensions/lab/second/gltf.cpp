@@ -231,6 +231,11 @@ class GltfReader {
       material.colour[i] = srgb_of_linear(std::clamp(base[c], 0.0, 1.0));
       material.emission[i] = srgb_of_linear(std::clamp(light[c], 0.0, 1.0));
     }
+    if (json.find("extensions/KHR_materials_unlit") && !pbr.find("baseColorTexture")) {
+      material.emission = glm::dvec3(material.colour);
+      material.colour = glm::dvec4(0, 0, 0, material.colour.a);
+      unlit_ = true;
+    }
     const std::string mode = text(json, "alphaMode");
     material.colour.a = mode == "BLEND" ? base[3] : 1;
     mesh_.knows_colours &= take_picture(info, material);
@@ -303,6 +308,7 @@ class GltfReader {
     }
     const auto colours = attribute("COLOR_0");
     if (!colours.empty()) mesh_.colours.resize(first, glm::dvec3(1));
+    mesh_.knows_colours &= colours.empty() || !unlit_;
     for (const auto& c : colours) {
       const auto stored = [](double light) { return srgb_of_linear(std::clamp(light, 0.0, 1.0)); };
       mesh_.colours.push_back({stored(c[0]), stored(c[1]), stored(c[2])});
@@ -344,6 +350,7 @@ class GltfReader {
   std::vector<Place> places_;
   Mesh mesh_;
   bool good_ = true;
+  bool unlit_ = false;  // a material without a picture is
 };
 
 }  // namespace

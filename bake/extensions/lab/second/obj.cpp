@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <map>
+#include <set>
 
 #include "bake/extensions/lab/second/second.hpp"
 
@@ -48,6 +49,7 @@ void take_map(const std::string& from, const std::vector<std::string>& words, Ma
 /// it has no such map.
 std::vector<std::pair<std::string, Material>> read_mtl(const std::string& path) {
   std::vector<std::pair<std::string, Material>> materials;
+  std::set<std::string> maps;
   const std::string bytes = file_bytes(path);
   std::string_view text = bytes;
   for (std::string line; take_line(text, line);) {
@@ -55,6 +57,7 @@ std::vector<std::pair<std::string, Material>> read_mtl(const std::string& path) 
     if (words.empty()) continue;
     if (words[0] == "newmtl") {
       materials.push_back({line.substr(line.find("newmtl") + 6), {}});
+      maps.clear();
     }
     if (materials.empty()) continue;
     Material& material = materials.back().second;
@@ -63,12 +66,15 @@ std::vector<std::pair<std::string, Material>> read_mtl(const std::string& path) 
       return words.size() < 4 ? glm::dvec3(number(words, 1))
                               : glm::dvec3(number(words, 1), number(words, 2), number(words, 3));
     };
-    if (words[0] == "Kd") look.colour = {colour(), look.colour.a};
+    if (words[0] == "Kd" && words.size() > 1 && is_number(words[1]))
+      look.colour = {colour(), look.colour.a};
     if (words[0] == "Ke") look.emission = colour();
     if (words[0] == "d" && number(words, 1) > 0) look.colour.a = number(words, 1);
     if (words[0] == "Tr" && look.colour.a == 1 && number(words, 1) < 1)
       look.colour.a = 1 - number(words, 1);
     if (words[0] == "map_Kd") take_map(path, words, material);
+    if (words[0] == "map_Kd" || words[0] == "map_d") maps.insert(words.back());
+    if (maps.size() > 1) material.known = false;  // opacity of its own
     if (words[0].starts_with("map_K") && look.picture.pixels.empty()) material.known = false;
   }
   for (auto& [name, material] : materials) {
@@ -110,7 +116,7 @@ class ObjReader {
     if (key == "v" || key == "vt" || key == "vn") {
       if (!std::all_of(words.begin() + 1, words.end(), is_number)) return false;
       if (key == "v") mesh_.positions.push_back(three(1));
-      if (key == "v" && words.size() == 7) mesh_.colours.push_back(three(4));
+      if (key == "v" && words.size() >= 7) mesh_.colours.push_back(three(4));
       if (key == "vt") mesh_.uvs.push_back({number(words, 1), number(words, 2)});
       if (key == "vn") mesh_.normals.push_back(three(1));
     } else if (key == "f") {
@@ -158,6 +164,9 @@ class ObjReader {
       }
     }
     if (mesh_.colours.size() != mesh_.positions.size()) mesh_.colours.clear();
+    double most = 0;
+    for (const glm::dvec3& c : mesh_.colours) most = std::max({most, c.r, c.g, c.b});
+    for (glm::dvec3& c : mesh_.colours) c /= most > 1 ? 255 : 1;
     std::vector<Material> used(numbers_.size() + 1);
     // Some programs name the picture as the model.
     used[0].known = mesh_.uvs.empty() || !mesh_.colours.empty() || !numbers_.empty();

@@ -172,6 +172,8 @@ class PlyReader {
   void take_face(const Element& element) {
     Face face;
     if (element.has("red")) face.colour = colour_of(element);
+    mesh_.knows_colours &= !element.has("red") || mesh_.colours.empty();
+    mesh_.knows_colours &= element.get({"texnumber"}) >= 0;
     const double last = static_cast<double>(mesh_.materials.size() - 1);
     face.material = static_cast<std::uint32_t>(std::clamp(element.get({"texnumber"}), 0.0, last));
     const auto uvs = element.lists.find("texcoord");
