@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -54,6 +55,13 @@ constexpr double kMostHeld = 0.52;
 constexpr double kLeastDetail = 0.05;
 // Share of all its sides that is sharp.
 constexpr double kSharpHeld = 0.82;
+// Of figures that are printed on a sheet: sine of a side against the sheet's, margin of those that
+// reach its edge, and share of detail around.
+constexpr double kParallel = 0.03;
+constexpr double kLeastMargin = 0.05;
+constexpr double kLeastPrint = 0.08;
+// Of a figure in the middle of another one: difference of margins, or turn, times its size.
+constexpr double kCentred = 0.06;
 // From a figure to the edges of a border around it, times its size.
 constexpr double kNearBorder = 0.02;
 constexpr double kFarBorder = 0.3;
@@ -740,12 +748,15 @@ Point on_plane(const cv::Matx33d& plane, double x, double y) {
   return {at[0] / at[2], at[1] / at[2]};
 }
 
-/// The share of a figure that has detail.
-double detail_in(const Gradients& gradients, const std::array<Point, 4>& figure) {
+/// The share of a figure that has detail, without the part of it that another figure covers.
+double detail_in(const Gradients& gradients, const std::array<Point, 4>& figure,
+                 const std::optional<std::array<Point, 4>>& without = std::nullopt) {
   constexpr double kDetail = 12;  // gradient, steps of a colour channel per pixel
   cv::Mat mask = cv::Mat::zeros(gradients.dx.size(), CV_8U);
   const std::vector<cv::Point> outline(figure.begin(), figure.end());
   cv::fillConvexPoly(mask, outline, 255);
+  if (without)
+    cv::fillConvexPoly(mask, std::vector<cv::Point>(without->begin(), without->end()), 0);
   const cv::Rect box = cv::boundingRect(outline) & cv::Rect(cv::Point(), mask.size());
   if (box.empty()) return 0;
   cv::Mat strength;
@@ -764,33 +775,89 @@ std::array<Point, 4> grown(const std::array<Point, 4>& figure, double times) {
   return out;
 }
 
+/// The place of a figure within another one, on their plane, where the other is 1 by 1.
+struct Placement {
+  std::array<double, 4> margins{};  // of each side, from the other figure's
+  std::array<double, 4> turns{};    // of each side against the other figure's: sines, ascending
+
+  Placement(const std::array<Point, 4>& outer, const std::array<Point, 4>& inner) {
+    const cv::Matx33d back = plane_of(outer).inv();
+    std::array<double, 4> x{};
+    std::array<double, 4> y{};
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Point at = on_plane(back, inner[i].x, inner[i].y);
+      const Point next = on_plane(back, inner[(i + 1) % 4].x, inner[(i + 1) % 4].y);
+      const Point side = next - at;
+      turns[i] = std::min(std::fabs(side.x), std::fabs(side.y)) / norm_of(side);
+      x[i] = at.x;
+      y[i] = at.y;
+    }
+    ranges::sort(turns);
+    ranges::sort(x);
+    ranges::sort(y);
+    margins = {x[1], y[1], 1 - x[2], 1 - y[2]};
+  }
+
+  /// As the picture within a border is.
+  [[nodiscard]] bool centred() const {
+    return std::max({std::fabs(margins[0] - margins[2]), std::fabs(margins[1] - margins[3]),
+                     turns[2]}) < kCentred;
+  }
+  /// Along three of the other figure's sides at least: a fourth may be another line's.
+  [[nodiscard]] bool parallel() const { return turns[2] < kParallel; }
+  /// Up to one of the other figure's sides.
+  [[nodiscard]] bool flush() const {
+    return *std::min_element(margins.begin(), margins.end()) < kLeastMargin;
+  }
+  /// Whether three sides are those of another figure.
+  [[nodiscard]] bool alike(const Placement& other) const {
+    int same = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      same += std::fabs(margins[i] - other.margins[i]) < kLeastMargin ? 1 : 0;
+    }
+    return same > 2;
+  }
+};
+
+/// Whether a figure within another one is printed on it: up to its edge or along its sides, with
+/// other print around. Tables and mats have little detail, and objects on them are askew.
+bool is_printed(const Gradients& gradients, const std::array<Point, 4>& sheet,
+                const std::array<Point, 4>& inner) {
+  const Placement place(sheet, inner);
+  return (place.flush() || place.parallel()) &&
+         detail_in(gradients, grown(sheet, 0.96), grown(inner, 1.06)) > kLeastPrint;
+}
+
+/// Of all sides of a figure, the share that is sharp.
+double sharp_around(const Gradients& gradients, const std::array<Point, 4>& figure) {
+  double sharp = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    sharp += sharp_along(gradients, figure[i], figure[(i + 1) % 4]) / 4;
+  }
+  return sharp;
+}
+
 /// Whether a figure within another one is an object on it, by its size, its edges and its detail.
 bool is_held(const Gradients& gradients, const std::array<Point, 4>& ground,
              const std::array<Point, 4>& held) {
   const double share = area_of(held) / area_of(ground);
   if (share < kLeastHeld || share > kMostHeld || !around(ground, held)) return false;
-  double sharp = 0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    sharp += sharp_along(gradients, held[i], held[(i + 1) % 4]) / 4;
-  }
-  return sharp > kSharpHeld && detail_in(gradients, grown(held, 0.92)) > kLeastDetail;
+  return sharp_around(gradients, held) > kSharpHeld &&
+         detail_in(gradients, grown(held, 0.92)) > kLeastDetail &&
+         !is_printed(gradients, ground, held);
 }
 
-/// Whether a figure is in the middle of another one, as the picture within a border is.
-bool is_centred(const cv::Matx33d& outer, const std::array<Point, 4>& inner) {
-  constexpr double kUneven = 0.06;  // difference of margins, or turn, times the outer one's size
-  const cv::Matx33d back = outer.inv();
-  std::array<Point, 4> at;
-  ranges::transform(inner, at.begin(),
-                    [&](const Point& corner) { return on_plane(back, corner.x, corner.y); });
-  double uneven = 0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Point off = at[i] + at[(i + 2) % 4] - Point(1, 1);
-    const Point side = at[(i + 1) % 4] - at[i];
-    uneven = std::max({uneven, std::fabs(off.x), std::fabs(off.y),
-                       std::min(std::fabs(side.x), std::fabs(side.y))});
+/// The figures in the middle of another one, as the picture within a border is.
+std::vector<Placement> centred_in(const Gradients& gradients, const std::vector<Figure>& figures,
+                                  const std::array<Point, 4>& corners) {
+  std::vector<Placement> out;
+  for (const Figure& figure : figures) {
+    const Placement place(corners, figure.corners);
+    if (place.centred() && !place.flush() && sharp_around(gradients, figure.corners) > kSharpHeld) {
+      out.push_back(place);
+    }
   }
-  return uneven < kUneven;
+  return out;
 }
 
 /// Whether a figure of edges is on a ground that has few on each of its sides, unlike the figure.
@@ -798,11 +865,16 @@ bool holds_a_figure(const Gradients& gradients, const std::vector<Figure>& figur
                     const std::array<Point, 4>& corners) {
   constexpr double kTimesMore = 3;   // share of the figure that has detail against the ground's
   constexpr std::size_t kMost = 20;  // figures that are looked at
-  const cv::Matx33d plane = plane_of(corners);
+  const std::vector<Placement> centred = centred_in(gradients, figures, corners);
   std::size_t seen = 0;
   for (const Figure& figure : figures) {
     const std::array<Point, 4>& c = figure.corners;
-    if (is_centred(plane, c) || !is_held(gradients, corners, c)) continue;
+    if (!is_held(gradients, corners, c)) continue;
+    const Placement place(corners, c);
+    if (place.centred() ||
+        ranges::any_of(centred, [&](const Placement& other) { return place.alike(other); })) {
+      continue;
+    }
     const std::array<Point, 4> near = grown(c, 1.06);
     const std::array<Point, 4> far = grown(c, 1.2);
     double ground = 0;

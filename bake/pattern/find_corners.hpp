@@ -16,6 +16,9 @@ inline constexpr double kDoubtfulSharpness = 0.92;
 /// Of sides that divide an object from its background, and of their sharpness then.
 inline constexpr double kClear = 0.8;
 inline constexpr double kClearEdge = 0.9;
+/// The same of sides that nearly all divide, where their weakest quarter is sharp to a share.
+inline constexpr double kClearAll = 0.95;
+inline constexpr double kClearQuarter = 0.76;
 /// Of sides that divide an object from a background with edges around it.
 inline constexpr double kClearFramed = 0.99;
 /// Of each quarter of sides that the background tells nothing of: below, one of their ends may be
@@ -38,7 +41,10 @@ struct FoundCorners {
   bool fills = false;     ///< nearly all of the photo, which may be the picture itself
   /// Whether the corners are those of the foreground: then edges around it are
   /// the background's.
-  [[nodiscard]] bool clear() const { return divided >= kClear && sharpness >= kClearEdge; }
+  [[nodiscard]] bool clear() const {
+    return (divided >= kClear && sharpness >= kClearEdge) ||
+           (divided >= kClearAll && quarter >= kClearQuarter);
+  }
   /// Why they may be wrong: "blurred", "framed", "rivalled" or "fills"; empty: they are sure.
   [[nodiscard]] const char* doubt() const {
     if (holds || (clear() && rivalled)) return "rivalled";

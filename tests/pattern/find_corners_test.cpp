@@ -263,6 +263,40 @@ TEST(FindPicture, ATableIsNotTakenForThePrintOnIt) {
   EXPECT_GE(doubted, 4) << "the table has the better edges";
 }
 
+/// A picture at one side, and text in a frame at the other.
+cv::Mat postcard() {
+  cv::Mat sheet(600, 900, CV_8UC3, cv::Scalar(225, 238, 242));
+  cv::Mat mural = asset("mural.png");
+  cv::resize(mural, mural, cv::Size(370, 460));
+  mural.copyTo(sheet(cv::Rect(50, 70, 370, 460)));
+  cv::rectangle(sheet, {475, 70, 380, 460}, cv::Scalar(40, 30, 160), 6);
+  for (int line = 0; line < 7; ++line) {
+    cv::putText(sheet, "Dear Jo, it rained", {500, 200 + 46 * line}, cv::FONT_HERSHEY_SIMPLEX, 1,
+                cv::Scalar(90, 40, 30), 2);
+  }
+  return sheet;
+}
+
+TEST(FindPicture, PicturesPrintedOnASheetAreNoObjectsOnIt) {
+  const std::vector<Corners> views = {
+      {{{200.3f, 170.6f}, {730.2f, 110.4f}, {790.8f, 560.1f}, {170.7f, 520.9f}}},
+      {{{380.5f, 90.2f}, {790.6f, 330.7f}, {560.3f, 640.4f}, {140.8f, 350.2f}}}};
+  for (const Corners& corners : views) {
+    const double light = &corners == views.data() ? 1 : 0.6;
+    const cv::Mat table = shaded(wood(), corners);
+    const Verdict one = verdict(photograph(postcard(), table, corners) * light, corners);
+    EXPECT_TRUE(one.good) << light;
+    EXPECT_FALSE(one.doubted) << light;
+  }
+  // The same as an object on a mat whose edges are in the photo, and along them.
+  const Corners mat = {{{130, 90}, {830, 80}, {860, 650}, {90, 640}}};
+  cv::Mat card = postcard();
+  cv::copyMakeBorder(card, card, 260, 420, 330, 430, cv::BORDER_CONSTANT,
+                     cv::Scalar(120, 160, 130));
+  const Photo photo{as_photo(photograph(card, wood(), mat))};
+  EXPECT_STREQ(find_picture(photo, find_corners(photo.image)).doubt, "rivalled");
+}
+
 TEST(FindPicture, TheInsideOfABlackBorderIsDoubted) {
   const Corners corners = {
       {{250.3f, 150.6f}, {720.2f, 120.4f}, {760.8f, 560.1f}, {220.7f, 520.9f}}};
