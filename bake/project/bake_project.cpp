@@ -89,6 +89,12 @@ std::string stamp_of(const std::string& path) {
          std::to_string(status.st_mtim.tv_nsec) + " " + std::to_string(status.st_ino);
 }
 
+/// What a bake calls a wrong command line was written in the project's file.
+Error of_file(Error error) {
+  if (error.exit == ExitCode::kUsage) error.exit = ExitCode::kInvalidInput;
+  return error;
+}
+
 class ProjectBake {
  public:
   ProjectBake(const Project& project, const ProjectOptions& options, PartCache cache,
@@ -104,7 +110,9 @@ class ProjectBake {
     for (Task& task : tasks_) plan(task);
     for (Target& target : targets_) plan(target);
     mark_wanted();
-    MODAR_TRY(options_.dry_run ? check_scenes() : bake_and_link());
+    if (auto done = options_.dry_run ? check_scenes() : bake_and_link(); !done) {
+      return tl::unexpected(of_file(std::move(done.error())));
+    }
     return outcome();
   }
 
@@ -426,7 +434,8 @@ class ProjectBake {
     const unsigned workers = options_.memory_limited ? 1 : std::clamp(stale, 1U, options_.jobs);
     const unsigned jobs = std::max(1U, options_.jobs / workers);
     const std::string stage =
-        "bake " + std::to_string(stale) + " of " + std::to_string(tasks_.size()) + " assets";
+        "bake " + (stale == tasks_.size() ? "" : std::to_string(stale) + " of ") +
+        std::to_string(tasks_.size()) + (tasks_.size() == 1 ? " asset" : " assets");
     double done = 0;
     parallel_rows(static_cast<std::uint32_t>(wanted.size()), workers, [&](std::uint32_t row) {
       Task& task = tasks_[wanted[row]];
@@ -796,7 +805,7 @@ class ProjectBake {
             {target.path, error ? 0 : bytes, written_.count(target.path) != 0, target.fresh});
       }
     }
-    outcome.errors = std::move(errors_);
+    ranges::transform(errors_, std::back_inserter(outcome.errors), of_file);
     return outcome;
   }
 

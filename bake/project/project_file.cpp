@@ -239,6 +239,10 @@ class TableReader {
       MODAR_TRY(take(option.name, number, 0));
       value = std::to_string(static_cast<long long>(number));
       if (number != std::floor(number)) return wrong(option.name, "a whole number");
+    } else if (std::holds_alternative<WordsOption>(option.value)) {
+      std::vector<std::string> words;
+      MODAR_TRY(take(option.name, words));
+      for (const std::string& one : words) value += (value.empty() ? "" : ",") + one;
     } else {
       MODAR_TRY(take(option.name, value));
     }

@@ -195,7 +195,9 @@ Json schema_of(const BakeOption& option) {
   const auto* word = std::get_if<WordOption>(&option.value);
   const std::vector<std::string> choices = option_choices(option);
   if (std::holds_alternative<WordsOption>(option.value)) {
-    schema.set("type", "string");
+    schema = {{"type", Json::array({"string", "array"})},
+              {"minItems", 1},
+              {"items", {{"type", "string"}}}};
   } else if (const auto* number = std::get_if<NumberOption>(&option.value)) {
     schema.set("type", "integer");
     schema.set("minimum", number->least);

@@ -49,15 +49,18 @@ bool fits_as_sound(const Mp4Info& info) {
   return info.video_tracks == 0 && known_sound(info) && lasts(info);
 }
 
-/// Whether FFmpeg decodes something of a stream: "0:v:0".
-Result<void> check_stream(const std::string& path, const char* stream, const char* what) {
+/// Whether FFmpeg decodes something of a file by these words: of a stream and of how much of it.
+bool decodes(const std::string& path, const std::vector<std::string>& part) {
+  std::vector<std::string> words = {"ffmpeg",    "-loglevel",    "quiet", "-nostdin",
+                                    "-abort_on", "empty_output", "-i",    path};
+  words.insert(words.end(), part.begin(), part.end());
+  words.insert(words.end(), {"-f", "null", "-"});
+  return run_process({words, {}, ""}) == 0;
+}
+
+Result<void> need_file(const std::string& path) {
   MODAR_TRY(MappedFile::open(path));
-  MODAR_TRY(need_ffmpeg());
-  const int read = run_process({{"ffmpeg", "-loglevel", "quiet", "-nostdin", "-i", path, "-map",
-                                 stream, "-t", "0.1", "-f", "null", "-"},
-                                {},
-                                ""});
-  return read == 0 ? Result<void>() : unreadable(path, what);
+  return need_ffmpeg();
 }
 
 /// Words of FFmpeg for the pictures.
@@ -123,11 +126,16 @@ tl::unexpected<Error> no_duration(const std::string& path) {
 }  // namespace
 
 Result<void> check_video(const std::string& path) {
-  return check_stream(path, "0:v:0", "video");
+  MODAR_TRY(need_file(path));
+  if (decodes(path, {"-map", "0:v:0", "-vf", "select=gte(n\\,1)", "-frames:v", "1"})) return {};
+  if (!decodes(path, {"-map", "0:v:0", "-frames:v", "1"})) return unreadable(path);
+  return fail(ExitCode::kInvalidInput, "video.still", path,
+              "it has one frame: a picture, not a video", "show it as a picture");
 }
 
 Result<void> check_sound(const std::string& path) {
-  return check_stream(path, "0:a:0", "sound");
+  MODAR_TRY(need_file(path));
+  return decodes(path, {"-map", "0:a:0", "-t", "0.1"}) ? Result<void>() : unreadable(path, "sound");
 }
 
 Result<EncodedMedia> encode_video(const std::string& path, const VideoSize& most) {

@@ -32,7 +32,8 @@ Result<EncodedMedia> encode_video(const std::string& path, const VideoSize& most
 /// The same of the first sound track of a file, without its pictures.
 Result<EncodedMedia> encode_sound(const std::string& path);
 
-/// Whether FFmpeg finds a video there: cheap, before long work. Errors as above.
+/// Whether FFmpeg finds a video there: cheap, before long work. Errors as above; kInvalidInput
+/// "video.still" for one of a single frame.
 Result<void> check_video(const std::string& path);
 Result<void> check_sound(const std::string& path);
 

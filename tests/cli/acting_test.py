@@ -283,13 +283,15 @@ class Acting(ProgramTest):
             scene = SCENE.replace(*change, 1)
             done = self.bake(scene)
             line = (HEAD + scene)[:(HEAD + scene).index(where)].count("\n") + 1
-            self.assertIn(done.returncode, (1, 3), (change, done.stderr))
+            self.assertEqual(done.returncode, 3, (change, done.stderr))  # read, and invalid
             self.assertIn(code, done.stderr, change)
             self.assertIn(f"modar.toml:{line}:", done.stderr, change)
             self.assertFalse((self.folder / "out").exists() and list((self.folder / "out").glob("*.modar")), change)
         # A part is known once its model is baked.
         done = self.bake(SCENE.replace('part = "wall"', 'part = "wal"'))
-        self.assertIn("did you mean 'wall'?", done.stderr)
+        self.assertEqual((done.returncode, "did you mean 'wall'?" in done.stderr), (3, True), done.stderr)
+        done = self.bake(SCENE + "[[scene.video]]\nfile = \"map.png\"\nname = \"film\"\n")
+        self.assertEqual((done.returncode, "video.still" in done.stderr), (3, True), done.stderr)
         (self.folder / "map.png").write_bytes(b"no picture")
         self.assertIn("image.decode", self.bake().stderr)
 

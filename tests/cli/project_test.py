@@ -198,7 +198,10 @@ class Files(ProjectTest):
             self.write(head + scene + "height = \"80mm\"\n")
             for words in ((), ("--dry-run",)):
                 with self.subTest(scene=scene, words=words):
-                    self.assert_fails(self.modar("bake", *words, cwd=self.place), 1, "scene.no-width")
+                    self.assert_fails(self.modar("bake", *words, cwd=self.place), 3, "scene.no-width")
+        # A list, as `modar init` wrote it once.
+        self.write("[bake]\nparameters = [\"none\"]\n" + head + "model = \"b\"\n")
+        self.assertEqual(self.modar("bake", "--dry-run", cwd=self.place).returncode, 0)
 
     def test_the_schema_knows_the_keys_of_the_program(self):
         tables = {key: value.get("items", value)["properties"] for key, value in SCHEMA["properties"].items()}
@@ -223,7 +226,8 @@ class Files(ProjectTest):
         head = "[[model]]\nfile = \"models/*.obj\"\n[[pattern]]\nfile = \"pictures/*\"\n"
         for text in ("[bake]\nmax-texture = 3", "[bake]\nmax-texture = 8192", "[bake]\nlods = 13", "[bake]\nlods = 12",
                      "[bake]\nloop-views = 0", "[bake]\nunit = \"ell\"", "[bake]\nunit = \"ft\"", "[bake]\nscore = \"no\"",
-                     "[bake]\nparameters = [\"none\"]", "[bake]\nparameters = 4", "[project]\nname = 3", "[bake]\nlods = 2.5",
+                     "[bake]\nparameters = [\"none\"]", "[bake]\nparameters = []", "[bake]\nparameters = 4", "[project]\nname = 3",
+                     "[bake]\nlods = 2.5",
                      "[[scene]]\npattern = \"a\"\nmodel = \"a\"\nscale = 0", "[[scene]]\npattern = \"a\"\nmodel = \"a\"\nup = \"-y\"",
                      "[[scene]]\npattern = \"a\"\nmodel = \"a\"\noffset = [1, 2]", "[[tier]]\nlods = 1",
                      "[[bundle]]\npatterns = \"a\"", "[gates]\nmin-psnr = -1", "[gates]\nmin-psnr = 30"):
@@ -322,6 +326,14 @@ class Again(ProjectTest):
         again = self.bake()
         self.assertEqual({asset["state"] for asset in again["assets"]}, {"cached"})
         self.assertIn("mtl.missing-map", self.findings(again))
+
+    def test_a_stage_counts_assets_only_where_not_all_are_baked(self):
+        def stages():
+            done = self.modar("bake", "--quiet", "--progress-json", cwd=self.place)
+            return {json.loads(line)["stage"] for line in done.stderr.splitlines() if line.startswith("{")}
+        self.assertEqual(stages(), {"bake 3 assets"})
+        (self.place / "models/a.obj").write_text((self.place / "models/a.obj").read_text() + "# new\n")
+        self.assertEqual(stages(), {"bake 1 of 3 assets"})
 
     def test_one_bad_file_fails_alone(self):
         (self.place / "models/b.obj").write_text("no model")
