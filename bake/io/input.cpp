@@ -13,49 +13,21 @@
 namespace modar {
 namespace {
 
-using std::string_view_literals::operator""sv;
-
-struct Signature {
-  std::string_view bytes;
-  std::size_t at;  ///< byte of the file
-  FileKind kind;
-  const char* name;
-};
-constexpr Signature kSignatures[] = {{"\x89PNG\r\n"sv, 0, FileKind::kPicture, "PNG"},
-                                     {"\xFF\xD8\xFF"sv, 0, FileKind::kPicture, "JPEG"},
-                                     {"WEBP"sv, 8, FileKind::kPicture, "WebP"},
-                                     {"II*\0"sv, 0, FileKind::kPicture, "TIFF"},
-                                     {"MM\0*"sv, 0, FileKind::kPicture, "TIFF"},
-                                     {"GIF8"sv, 0, FileKind::kPicture, "GIF"},
-                                     {"ftyphei"sv, 4, FileKind::kPicture, "HEIC"},
-                                     {"ftypmif1"sv, 4, FileKind::kPicture, "HEIF"},
-                                     {"ftypavif"sv, 4, FileKind::kPicture, "AVIF"},
-                                     {"ftyp"sv, 4, FileKind::kVideo, "MP4"},
-                                     {"AVI "sv, 8, FileKind::kVideo, "AVI"},
-                                     {"\x1A\x45\xDF\xA3"sv, 0, FileKind::kVideo, "WebM"},
-                                     {"PK\3\4"sv, 0, FileKind::kArchive, "packed files"},
-                                     {"glTF"sv, 0, FileKind::kModel, "glTF"},
-                                     {"ply\n"sv, 0, FileKind::kModel, "PLY"},
-                                     {"ply\r"sv, 0, FileKind::kModel, "PLY"},
-                                     {"solid "sv, 0, FileKind::kModel, "STL"},
-                                     {"\x89MOD\r\n"sv, 0, FileKind::kBundle, "ModAR"}};
-
 struct KindWords {
-  const char* noun;
   const char* code;
   const char* cure;  ///< where a model or a picture is wanted
 };
 /// By FileKind.
 constexpr KindWords kKinds[] = {
-    {"model", "model",
+    {"model",
      "pass it as a model, with the ending of one; patterns are PNG, JPEG, WebP, TIFF, BMP and TGA "
      "files"},
-    {"picture", "image",
+    {"image",
      "pass it as a pattern, with the ending of a picture; models are glTF, OBJ, PLY and STL files"},
-    {"bundle", "bundle",
+    {"bundle",
      "`modar check`, `inspect`, `report` and `web` and modar-play take it; bake its sources"},
-    {"video", "video", "take a picture of it: ffmpeg -i VIDEO -frames:v 1 picture.png"},
-    {"zip", "zip", "unzip it, and name its files; in a project's folder, run `modar bake`"}};
+    {"video", "take a picture of it: ffmpeg -i VIDEO -frames:v 1 picture.png"},
+    {"zip", "unzip it, and name its files; in a project's folder, run `modar bake`"}};
 
 std::string ending_of(const std::string& path) {
   return ascii_lower(std::filesystem::path(path).extension().string());
@@ -84,22 +56,19 @@ Result<void> require_kind(FileKind wanted, std::string_view start, const std::st
     return fail(ExitCode::kInvalidInput, "io.empty", path, "the file is empty",
                 "make it again, or copy it again");
   }
-  const auto* found = ranges::find_if(kSignatures, [&](const Signature& one) {
-    return start.size() > one.at && start.substr(one.at).starts_with(one.bytes);
-  });
+  const FileSignature* const found = find_signature(start);
   // Other formats, such as 3MF, are ZIP files, too.
-  const bool known = found != std::end(kSignatures) &&
-                     (found->kind != FileKind::kArchive || ending_of(path) == ".zip");
+  const bool known =
+      found != nullptr && (found->kind != FileKind::kArchive || ending_of(path) == ".zip");
   const FileKind kind = known ? found->kind : FileKind::kModel;
   if (kind == wanted) return {};
-  const char* format = known ? found->name : unsigned_model(start, path);
+  const char* format = known ? found->format : unsigned_model(start, path);
   if (format == nullptr) return {};
   const auto words_of = [](FileKind one) { return kKinds[static_cast<std::size_t>(one)]; };
   const bool bakes = wanted == FileKind::kBundle;
-  return fail(ExitCode::kUsage, std::string(words_of(wanted).code) + "." + words_of(kind).noun,
-              path,
-              std::string("this is a ") + words_of(kind).noun + " (" + format + "), not a " +
-                  words_of(wanted).noun,
+  const auto noun_of = [](FileKind one) { return kKindNouns[static_cast<std::size_t>(one)]; };
+  return fail(ExitCode::kUsage, std::string(words_of(wanted).code) + "." + noun_of(kind), path,
+              wrong_kind(kind, format, noun_of(wanted)),
               bakes ? "bake it first, as in `modar bake model.glb picture.png -o name.modar`"
                     : words_of(kind).cure);
 }

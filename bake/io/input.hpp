@@ -2,13 +2,13 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
 #include <system_error>
 
 #include "formats/base/error.hpp"
+#include "formats/base/file_kind.hpp"
 
 namespace modar {
 
@@ -28,7 +28,6 @@ Result<std::string> read_file(const std::string& path, std::size_t most);
 /// Refuses a file of another kind by its first bytes: an empty file, a picture where a
 /// model is wanted, and so on. start: at least 16 bytes, or the whole file. Errors: kInvalidInput
 /// "io.empty"; kUsage "model.picture", "image.model" and so on: the wanted kind, the found one.
-enum class FileKind : std::uint8_t { kModel, kPicture, kBundle, kVideo, kArchive };
 Result<void> require_kind(FileKind wanted, std::string_view start, const std::string& path);
 /// The same of a file that can be opened.
 Result<void> require_kind(FileKind wanted, const std::string& path);

@@ -2,6 +2,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cinttypes>
 #include <cstdio>
@@ -9,8 +10,10 @@
 #include <span>
 
 #include "formats/base/atomic_file.hpp"
+#include "formats/base/file_kind.hpp"
 #include "formats/json_writer.hpp"
 #include "modar/fetch.hpp"
+#include "modar/mapped_file.hpp"
 #include "modar/release.hpp"
 #include "runtime/platform/command_line.hpp"
 #include "store.hpp"
@@ -320,16 +323,26 @@ int run_verify(const CommandLine& line) {
   return 0;
 }
 
+/// The text of a file with the keys of --trust.
+Result<std::string> read_trust(const std::string& path) {
+  MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
+  const std::string_view bytes(reinterpret_cast<const char*>(file.bytes().data()),
+                               std::min(file.bytes().size(), kMaxKeyBytes));
+  if (const FileSignature* const found = find_signature(bytes)) {
+    return fail(ExitCode::kInvalidInput, "key.public", path,
+                wrong_kind(found->kind, found->format, "key"),
+                "give the publisher's public key, the file K.pub of `modar ship keygen`");
+  }
+  if (auto trusted = parse_root_set(bytes); !trusted) {
+    trusted.error().where = path;
+    return tl::unexpected(trusted.error());
+  }
+  return std::string(bytes);
+}
+
 int run_fetch(CommandLine& line) {
-  const auto key = read_small_file(line.trust_file, kMaxKeyBytes);
-  if (!key) {
-    return answer({ExitCode::kIo, "io.open", line.trust_file, "it cannot be read, or is no key",
-                   "give the publisher's public key with --trust"});
-  }
-  if (auto trusted = parse_root_set(*key); !trusted) {
-    trusted.error().where = line.trust_file;
-    return answer(trusted.error());
-  }
+  const auto key = read_trust(line.trust_file);
+  if (!key) return answer(key.error());
   line.options.trusted_key = *key;
   const bool bar = !line.quiet && !line.json && ::isatty(STDERR_FILENO) != 0;
   if (bar) line.options.progress = show_progress;

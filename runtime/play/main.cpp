@@ -1,8 +1,11 @@
 // modar-play: maps a bundle and plays it over a video, pictures or a camera: puts source, vision
 // and player together.
+#include <algorithm>
 #include <cstdio>
 #include <optional>
+#include <span>
 
+#include "formats/base/file_kind.hpp"
 #include "formats/bundle_view.hpp"
 #include "formats/check.hpp"
 #include "frame_sink.hpp"
@@ -132,6 +135,18 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle, const
   return player.finish(*counts);
 }
 
+/// Why a file is not read as a bundle: `error`, or that it begins as another kind of file does.
+Error unread(Error error, const std::string& path, std::span<const std::byte> bytes) {
+  const FileSignature* const found = find_signature(
+      {reinterpret_cast<const char*>(bytes.data()), std::min<std::size_t>(bytes.size(), 16)});
+  if (found != nullptr && found->kind != FileKind::kBundle) {
+    error = {ExitCode::kUsage, "bundle.kind", path,
+             wrong_kind(found->kind, found->format, "bundle"), "bake it first, with `modar bake`"};
+  }
+  if (error.where != path) error.where = path + (error.where.empty() ? "" : ":" + error.where);
+  return error;
+}
+
 Result<int> run(const PlayOptions& options) {
   MODAR_TRY(check_outputs(options));
   MODAR_ASSIGN(MappedFile file, MappedFile::open(options.bundle));
@@ -139,13 +154,7 @@ Result<int> run(const PlayOptions& options) {
   if (bundle && options.verify) {
     if (auto whole = verify_sections(*bundle); !whole) bundle = tl::unexpected(whole.error());
   }
-  if (!bundle) {
-    Error error = bundle.error();
-    if (error.where != options.bundle) {
-      error.where = options.bundle + (error.where.empty() ? "" : ":" + error.where);
-    }
-    return tl::unexpected(error);
-  }
+  if (!bundle) return tl::unexpected(unread(bundle.error(), options.bundle, file.bytes()));
   if (options.turntable == 0) return play_video(options, *bundle, file);
   MODAR_TRY(play_turntable(options, *bundle, file));
   return 0;

@@ -203,7 +203,7 @@ class WrongFiles(ProgramTest):
             (self.folder / "clip.png").write_bytes(data)
             self.assert_everywhere("clip.png", "not a picture; take a picture of it: ffmpeg", model=False, code=1)
         (self.folder / "all.zip").write_bytes(b"PK\3\4" + bytes(40))
-        self.assert_fails(self.modar("bake", "all.zip"), 1, "this is a zip (packed files), not a model; unzip it")
+        self.assert_fails(self.modar("bake", "all.zip"), 1, "this is a zip (PKZIP), not a model; unzip it")
 
     def test_what_is_missing_is_named_before_options(self):
         for words in (("missing.glb",), ("../nofolder",), (COVER, "missing.png")):

@@ -40,7 +40,7 @@ class Play(ProgramTest):
         bundle = self.bake_demo()
         self.assert_fails(self.play(), 1, "--help")
         self.assert_fails(self.play("none.modar", "--input", COVER), 2, "none.modar")
-        self.assert_fails(self.play(COVER, "--input", COVER), 3, str(COVER))
+        self.assert_fails(self.play(COVER, "--input", COVER), 1, str(COVER), "this is a picture (PNG), not a bundle; bake it first")
         self.assert_fails(self.play(bundle, "--input", "none.mp4"), 2, "none.mp4")
         rotten = self.folder / "rotten.modar"
         data = bytearray(bundle.read_bytes())
