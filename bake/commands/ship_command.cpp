@@ -160,6 +160,7 @@ void add_publish(CommandLine& ship) {
               {.type = "NAME=PROFILE[,PROFILE]"});
   line.option("--jobs", &request.recipe.jobs, "Processes; the output does not depend on it",
               {.shows_default = true, .least = 1, .most = 256});
+  line.flag("--force", request.force, "Write into a folder that contains other files");
   line.flag("--quiet", publish->quiet, "No progress or summary");
   line.flag("--json", publish->json, "Print the release and the written files as JSON");
   line.footer(ship_example("  modar ship publish vase.modar --to /var/www/ar --key museum.key\n"));

@@ -66,6 +66,14 @@ Result<void> make_output_folder(const std::string& folder) {
   return {};
 }
 
+Result<void> keep_foreign_folder(const std::string& folder, const std::string& cure) {
+  std::error_code error;
+  const bool none = !fs::is_directory(folder, error) || fs::is_empty(folder, error);
+  if (error || none || fs::exists(fs::path(folder) / kFolderMark, error)) return {};
+  return fail(ExitCode::kUsage, "out.foreign-folder", folder,
+              "the folder contains files that modar has not written", cure);
+}
+
 OutputFolder::OutputFolder(std::string folder, bool made)
     : folder_(std::move(folder)),
       staging_(path(std::string(kStaging) + std::to_string(::getpid()))),
@@ -95,10 +103,9 @@ Result<OutputFolder> OutputFolder::claim(const std::string& folder, bool force) 
   remove_left_staging(folder);
   const bool there = fs::exists(folder, error);
   const bool empty = !there || !fs::is_directory(folder, error) || fs::is_empty(folder, error);
-  if (!error && !empty && !force && !fs::exists(fs::path(folder) / kFolderMark, error)) {
-    return fail(ExitCode::kUsage, "out.foreign-folder", folder,
-                "the folder contains files that modar has not written",
-                "name a new or an empty folder, or write into this one with --force");
+  if (!force) {
+    MODAR_TRY(keep_foreign_folder(
+        folder, "name a new or an empty folder, or write into this one with --force"));
   }
   MODAR_TRY(make_output_folder(folder));
   OutputFolder output(folder, !there);

@@ -20,12 +20,15 @@ class BundleView;
 /// Makes the folder and those above it where they are missing. Errors: kIo "io.folder".
 Result<void> make_output_folder(const std::string& folder);
 
+/// Refuses a folder that holds files and no mark of an earlier run: somebody may have named a web
+/// server's root. Errors: kUsage "out.foreign-folder".
+Result<void> keep_foreign_folder(const std::string& folder, const std::string& cure);
+
 /// A folder of files that are written together: all of them, or none where one fails.
 class OutputFolder {
  public:
-  /// Makes the folder where it is missing. One that holds files and no mark of an earlier run is
-  /// refused unless `force` is set: somebody may have named a web server's root.
-  /// Errors: kUsage "out.foreign-folder", kIo "io.folder".
+  /// Makes the folder where it is missing. Errors: those of keep_foreign_folder() unless `force` is
+  /// set; kIo "io.folder".
   static Result<OutputFolder> claim(const std::string& folder, bool force);
   OutputFolder(OutputFolder&& other) noexcept;
   OutputFolder& operator=(OutputFolder&&) = delete;

@@ -230,7 +230,7 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
                 "name bundles, or --drop NAME");
   }
   MODAR_TRY(check_bundles(request));
-  MODAR_ASSIGN(const auto folder, ReleaseFolder::open(request.folder));
+  MODAR_ASSIGN(const auto folder, ReleaseFolder::open(request.folder, request.force));
   MODAR_TRY(folder.check_signer(key.public_key));
   MODAR_ASSIGN(const auto newest, folder.newest());
   const std::vector<ReleaseBundle> before = newest ? newest->bundles : std::vector<ReleaseBundle>();

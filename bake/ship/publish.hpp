@@ -18,6 +18,7 @@ struct PublishRequest {
   std::vector<std::string> bundles;  ///< files; their names without extension name the bundles
   std::vector<std::string> drop;     ///< names of bundles that leave the release
   bool dry_run = false;              ///< writes nothing
+  bool force = false;                ///< into a folder of other files, too
   std::string folder;
   std::uint64_t version = 0;  ///< 0: one more than the newest
   std::int64_t expires = 0;   ///< seconds since 1970, UTC; kNever

@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
@@ -13,8 +14,10 @@
 #include <set>
 #include <utility>
 
+#include "bake/io/output.hpp"
 #include "bake/ship/verify_release.hpp"
 #include "formats/base/atomic_file.hpp"
+#include "formats/base/ranges.hpp"
 #include "modar/piece.hpp"
 #include "modar/release.hpp"
 
@@ -97,15 +100,31 @@ Result<void> sync_objects(const std::string& path) {
   return {};
 }
 
+constexpr std::array kParts = {"releases", "keys", "objects"};
+
+/// Copies may lack an empty part; and another publisher may be making them.
+bool has_parts(const std::string& path) {
+  std::error_code error;
+  std::size_t parts = 0;
+  std::size_t others = 0;
+  for (const auto& entry : fs::directory_iterator(path, error)) {
+    ++(ranges::count(kParts, entry.path().filename()) != 0 ? parts : others);
+  }
+  return parts + 1 >= kParts.size() || others == 0;
+}
+
 }  // namespace
 
 ReleaseFolder::ReleaseFolder(std::string path, FolderLock lock)
     : path_(std::move(path)), lock_(std::move(lock)) {}
 
-Result<ReleaseFolder> ReleaseFolder::open(const std::string& path) {
-  for (const char* folder : {"/releases", "/keys", "/objects"}) {
-    MODAR_TRY(make_folders(path + folder));
+Result<ReleaseFolder> ReleaseFolder::open(const std::string& path, bool force) {
+  if (!force && !has_parts(path)) {
+    MODAR_TRY(keep_foreign_folder(path,
+                                  "name a new, an empty or a release's folder; `modar ship publish "
+                                  "--force` writes into this one"));
   }
+  for (const char* folder : kParts) MODAR_TRY(make_folders(fs::path(path) / folder));
   MODAR_ASSIGN(auto lock, FolderLock::take(path + "/.lock", {kExitLocked, "ship.locked", path,
                                                              "another publisher is using it",
                                                              "wait until it ends"}));

@@ -28,8 +28,9 @@ namespace modar {
 /// Holds the lock of the folder: one publisher at a time.
 class ReleaseFolder {
  public:
-  /// Creates missing parts. Errors: kIo; kExitLocked "ship.locked".
-  static Result<ReleaseFolder> open(const std::string& path);
+  /// Creates missing parts. Errors: kIo; kExitLocked "ship.locked"; kUsage "out.foreign-folder" for
+  /// one of other files, unless `force` is set.
+  static Result<ReleaseFolder> open(const std::string& path, bool force = false);
 
   /// Numbers of the releases, by epoch, then ascending.
   [[nodiscard]] std::vector<std::uint64_t> versions() const;

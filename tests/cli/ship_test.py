@@ -292,6 +292,23 @@ class Publish(ShipTest):
         done = self.modar("ship", "publish", longest, "--to", self.folder / "new", "--key", self.shop.key)
         self.assertEqual(done.returncode, 0, done.stderr)
 
+    def test_a_folder_of_other_files_takes_no_release_unless_forced(self):
+        words = ("--to", self.site, "--key", self.shop.key)
+        self.site.mkdir()
+        (self.site / "thesis.txt").write_text("mine")
+        for command in (("publish", self.shop.old, *words), ("publish", self.shop.old, *words, "--dry-run"), ("list", *words[:2])):
+            self.assert_fails(self.modar("ship", *command), 1, "out.foreign-folder", "--force")
+            self.assertEqual(os.listdir(self.site), ["thesis.txt"])
+        done = self.modar("ship", "publish", self.shop.old, *words, "--force")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        # It is a release's folder from now on; copies of one without its empty folders are, too.
+        (self.site / "keys").rmdir()
+        (self.site / ".lock").unlink()
+        done = self.modar("ship", "publish", self.shop.new, *words)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.fetch_json()
+        self.assert_installed(self.shop.new)
+
     def test_names_that_differ_by_case_only_are_refused(self):
         other = self.folder / "Museum.modar"
         shutil.copy(self.shop.old, other)
@@ -743,6 +760,10 @@ class Refusals(ShipTest):
         self.assert_fails(self.run_program("modar-fetch", "--stroe", "x"), 1, "--stroe")
         self.assertEqual(self.run_program("modar-fetch", "--help").returncode, 0)
         self.assert_fails(self.fetch(trust=self.folder / "nokey"), 2, "nokey")
+        # A few bytes of it, as many as a key has at most, and more.
+        for size in (16, 4096, 4097):
+            (self.folder / "cover.png").write_bytes(b"\x89PNG\r\n\x1a\n".ljust(size, b"\0"))
+            self.assert_fails(self.fetch(trust=self.folder / "cover.png"), 3, "this is a picture (PNG), not a key")
 
 
 class Store(ShipTest):
