@@ -3,13 +3,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
+#include <random>
+#include <vector>
 
 #include "bake/mesh/lod/mesh_levels.hpp"
 #include "bake/mesh/lod/reduce.hpp"
 #include "bake/mesh/rays/occlusion.hpp"
 #include "bake/mesh/repair/repair.hpp"
 #include "bake/mesh/upright.hpp"
+#include "bake/mesh/weld/triangulate.hpp"
 #include "tests/fuzz/made_model.hpp"
 #include "tests/mesh/stages.hpp"
 #include "tests/soak.hpp"
@@ -65,6 +70,32 @@ std::uint64_t blocks_of(const test::Part& part) {
   EXPECT_TRUE(make_proxies(chunked, *starts, {plan, options.positions}, report));
   testing::packed(chunked, 256);
   return blocks - before;
+}
+
+TEST(Budget, PolygonsTakeWorkInProportionToTheirCorners) {
+  enum class Shape { kStar, kTangle, kCrescent };
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> u(0.2, 1);
+  const auto corner = [&](Shape shape, int i, int corners) -> glm::dvec3 {
+    if (shape == Shape::kCrescent) {
+      const double x = std::min(i, corners - i) / (0.5 * corners);
+      return {x, (2 * i > corners ? 1.1 : 1.0) * x * (1 - x), 0};
+    }
+    const double angle = shape == Shape::kTangle ? 9 * u(random) : i * 6.283185 / corners;
+    return u(random) * glm::dvec3(std::cos(angle), std::sin(angle), 0);
+  };
+  const auto cost = [&](Shape shape, int corners) {
+    std::vector<glm::dvec3> polygon;
+    for (int i = 0; i < corners; ++i) polygon.push_back(corner(shape, i, corners));
+    std::vector<std::array<std::uint32_t, 3>> triangles;
+    const std::uint64_t before = blocks;
+    EXPECT_EQ(triangulate(polygon, triangles), shape != Shape::kTangle);
+    return static_cast<double>(blocks - before);
+  };
+  for (const Shape shape : {Shape::kStar, Shape::kTangle, Shape::kCrescent}) {
+    const double few = cost(shape, 4000);
+    EXPECT_LE(cost(shape, 16000), kMostGrowth * few) << static_cast<int>(shape);
+  }
 }
 
 TEST(Budget, WorkGrowsWithTheTriangles) {

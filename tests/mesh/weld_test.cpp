@@ -69,6 +69,25 @@ TEST(Triangulate, ConcavePolygonsAreTiledWithoutOverlap) {
                 {2, 2, 0}});
 }
 
+TEST(Triangulate, LargeConcavePolygonsAreTiledAsSmallOnes) {
+  constexpr double kPi = 3.14159265358979;
+  const auto around = [](int corners, const auto& radius) {
+    std::vector<glm::dvec3> polygon;
+    for (int i = 0; i < corners; ++i) {
+      const double angle = i * 2 * kPi / corners;
+      polygon.push_back(radius(i) * glm::dvec3(std::cos(angle), std::sin(angle), 0));
+    }
+    return polygon;
+  };
+  expect_tiles(around(6000, [](int i) { return 1 + 0.5 * std::cos(9 * i * 2 * kPi / 6000); }));
+  expect_tiles(around(6000, [](int i) { return i % 2 == 0 ? 3.0 : 1.0; }));
+  // Ears at its two tips alone.
+  std::vector<glm::dvec3> crescent;
+  for (int i = 0; i <= 3000; ++i) crescent.emplace_back(i, 1e-3 * i * (3000 - i), 0);
+  for (int i = 2999; i > 0; --i) crescent.emplace_back(i, 1.1e-3 * i * (3000 - i), 0);
+  expect_tiles(crescent);
+}
+
 TEST(Triangulate, PolygonsThatGoAroundAgainAreOneRound) {
   const std::vector<glm::dvec3> dart = {{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {2, 1, 0}, {0, 4, 0}};
   for (const std::size_t corners : {6U, 7U, 10U, 25U, 5000U}) {

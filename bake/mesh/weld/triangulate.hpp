@@ -10,14 +10,10 @@
 
 namespace modar {
 
-/// Beyond this many corners a concave polygon is cut into a fan, since ear clipping takes quadratic
-/// time: 2,048 corners take some milliseconds.
-inline constexpr std::size_t kMaxEarCorners = 2048;
-
 /// Triangulates one polygon: a fan where it is convex, ears where it is not (Meisters, 1975); the
 /// winding stays. positions: its corners in order, 3 or more, not necessarily planar.
 /// out: appended corner numbers, positions.size() - 2 triangles. Returns false where the polygon is
-/// too tangled for ear clipping and the rest became a fan.
+/// too tangled, or takes too long, for ear clipping and the rest became a fan.
 bool triangulate(std::span<const glm::dvec3> positions,
                  std::vector<std::array<std::uint32_t, 3>>& out);
 
