@@ -97,9 +97,9 @@ constexpr IssueKind kKinds[] = {
      "A pattern was recognised in no view of its score: nothing on it will be seen",
      "`modar pattern score` names the cause; choose another picture"},
     {"MODEL_UNSEEN", Severity::kWarning,
-     "Nothing of a model is drawn for those who look at its pattern: it shows them backs of "
-     "one-sided materials, or is transparent",
-     "turn it (turn=180:0:0), or make its materials two-sided or opaque"},
+     "Nothing of a model is drawn for those who look at its pattern from the front: it shows them "
+     "backs of one-sided materials, or is transparent",
+     "turn it (turn=180, or turn=180:0:0), or make its materials two-sided or opaque"},
 };
 static_assert(std::size(kKinds) == static_cast<std::size_t>(WorkstationRule::kCount));
 
@@ -201,10 +201,8 @@ void report_unseen(const BundleView& bundle, const IssueSink& sink) {
     tell(WorkstationRule::kPatternUnseen, &pattern, "pattern", pattern.name);
   }
   for (const SceneRecord& scene : bundle.scenes()) {
-    const ModelRecord& model = bundle.models()[scene.model];
-    if (draws_nothing(scene, model, bundle.chunks(), bundle.materials())) {
-      tell(WorkstationRule::kModelUnseen, &scene, "model", model.name);
-    }
+    if (!draws_nothing(bundle, scene)) continue;
+    tell(WorkstationRule::kModelUnseen, &scene, "model", bundle.models()[scene.model].name);
   }
 }
 

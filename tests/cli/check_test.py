@@ -279,24 +279,29 @@ class Check(ProgramTest):
         self.assertGreater(look["ssim_worst"], 0.9)
 
     def test_what_cannot_be_seen_is_named(self):
-        # Sheets that look down into the pattern: glTF says that backs are not drawn, OBJ says nothing.
-        (self.folder / "down.bin").write_bytes(struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 0, 1))
-        (self.folder / "down.gltf").write_text(json.dumps({
-            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 0, 1]}],
-            "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"uri": "down.bin", "byteLength": 36}]}))
+        # Sheets that look down into the pattern, or away from the visitor: glTF says that backs are not drawn, OBJ says nothing.
+        for name, corners in (("down", (0, 0, 0, 1, 0, 0, 0, 0, 1)), ("back", (0, 0, 0, 0, 1, 0, 1, 0, 0)), ("front", (0, 0, 0, 1, 0, 0, 0, 1, 0))):
+            (self.folder / f"{name}.bin").write_bytes(struct.pack("<9f", *corners))
+            (self.folder / f"{name}.gltf").write_text(json.dumps({
+                "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+                "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+                "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0],
+                               "max": [max(corners[i::3]) for i in range(3)]}],
+                "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"uri": f"{name}.bin", "byteLength": 36}]}))
         (self.folder / "sheet.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n")
         picture(self.folder / "p.png")
-        done = self.modar("bake", "down.gltf", "sheet.obj", "p.png", "--scene", "p=down", "--scene", "p=sheet,up=y,offset=0:20:0",
-                          "--scene", "p=down", *QUICK, "-o", "o.modar")
+        done = self.modar("bake", "down.gltf", "back.gltf", "front.gltf", "sheet.obj", "p.png", "--scene", "p=down", "--scene",
+                          "p=sheet,up=y,offset=0:20:0", "--scene", "p=down", "--scene", "p=back", "--scene", "p=back,turn=40",
+                          "--scene", "p=front", "--scene", "p=front,turn=40", "--scene", "p=front,turn=220", *QUICK, "-o", "o.modar")
         self.assertIn("sheet: 1 of 1 material is on open or inside-out surfaces: both sides are drawn", done.stderr)
         self.assertIn("p=sheet: its offset is 20 times the pattern's longer side", done.stderr)
         self.assertEqual(done.stderr.count("p=down: nothing of the model is drawn"), 1)
+        self.assertEqual([done.stderr.count(f"p={name}: nothing of the model is drawn") for name in ("back", "front")], [1, 1])
         self.assertEqual(done.stderr.count("p=down: another scene has the same model at the same place"), 1)
         self.assertNotIn("p=sheet: nothing", done.stderr)
         said = self.check(0, "o.modar")
         self.assertIn("warning MODEL_UNSEEN model 'down'", said)
+        self.assertEqual([said.count(f"model '{name}'") for name in ("back", "front")], [2, 1])
         self.assertEqual(self.modar("report", "o.modar", "-o", "o.html", "--quiet").returncode, 0)
         self.assertEqual((self.folder / "o.html").read_text(encoding="utf-8").count("MODEL_UNSEEN"), said.count("MODEL_UNSEEN"))
         self.assertNotIn("model 'sheet'", said)

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <span>
 
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/trigonometric.hpp>
@@ -100,6 +102,45 @@ TurnedBox box_of_vertices(const ModelRecord& model, const LayoutRecord& layout,
     }
   }
   return box;
+}
+
+/// Whether a model has triangles, but hardly any that is drawn for those who look down on the
+/// pattern from in front of it.
+template <class Chunks, class Levels, class Materials>
+bool shows_backs(const SceneRecord& scene, const ModelRecord& model, const LayoutRecord& layout,
+                 const Chunks& chunks, const Levels& levels, const Materials& materials,
+                 std::span<const std::byte> vertices, std::span<const std::byte> indices) {
+  constexpr float kTransparent = 0.004f;
+  constexpr std::uint32_t kFew = 100;  // a hundredth of the triangles may be faults of the model
+  const glm::dvec3 eyes[] = {{0, -0.87, 0.5}, {0, -0.71, 0.71}, {0, -0.5, 0.87}};
+  const glm::dquat turn(scene.rotation[3], scene.rotation[0], scene.rotation[1], scene.rotation[2]);
+  const VertexDecoder decoder(layout);
+  const ModelPose still;
+  std::uint64_t triangles = 0;
+  std::uint64_t seen = 0;
+  for (std::uint32_t c = model.first_chunk; c < model.first_chunk + model.chunk_count; ++c) {
+    const ChunkRecord& chunk = chunks[c];
+    const MaterialRecord& material = materials[chunk.material];
+    const LevelRecord& level = levels[chunk.first_level];
+    if ((material.flags & kMaterialOccluder) != 0) continue;
+    triangles += level.index_count / 3;
+    if (material.opacity < kTransparent) continue;
+    if ((material.flags & kMaterialTwoSided) != 0) return false;
+    for (std::uint32_t i = 0; i + 2 < level.index_count; i += 3) {
+      std::array<std::uint16_t, 3> corners{};
+      std::memcpy(corners.data(), indices.data() + level.index_offset + 2 * std::uint64_t{i}, 6);
+      std::array<glm::dvec3, 3> p;
+      ranges::transform(corners, p.begin(), [&](std::uint16_t corner) {
+        return still.place(
+            layout, decoder, chunk,
+            vertices.data() + level.vertex_offset + std::uint64_t{corner} * decoder.stride());
+      });
+      const glm::dvec3 normal = turn * glm::cross(p[1] - p[0], p[2] - p[0]);
+      seen += ranges::any_of(eyes, [&](const auto& eye) { return glm::dot(normal, eye) > 0; });
+      if (seen * kFew > model.triangle_count) return false;
+    }
+  }
+  return triangles > 0;
 }
 
 /// As the scene's clip begins.
@@ -255,6 +296,22 @@ SceneRecord place_scene(const SceneRequest& resolved, const BundleContent& conte
   return scene;
 }
 
+bool draws_nothing(const BundleContent& content, const SceneRecord& scene) {
+  const ModelRecord& model = content.models[scene.model];
+  return ranges::count(content.clips, scene.model, &ClipRecord::model) == 0 &&
+         shows_backs(scene, model, content.layouts[model.layout], content.chunks, content.levels,
+                     content.materials, content.vertices, content.indices);
+}
+
+bool draws_nothing(const BundleView& bundle, const SceneRecord& scene) {
+  for (const ClipRecord& clip : bundle.clips()) {
+    if (clip.model == scene.model) return false;
+  }
+  const ModelRecord& model = bundle.models()[scene.model];
+  return shows_backs(scene, model, bundle.layouts()[model.layout], bundle.chunks(), bundle.levels(),
+                     bundle.materials(), bundle.vertices(), bundle.indices());
+}
+
 std::vector<Diagnostic> doubtful_scenes(const BundleContent& content) {
   std::vector<Diagnostic> found;
   const auto name_of = [&](NameRef name) { return content.names.substr(name.offset, name.length); };
@@ -266,11 +323,10 @@ std::vector<Diagnostic> doubtful_scenes(const BundleContent& content) {
   };
   for (std::size_t i = 0; i < content.scenes.size(); ++i) {
     const SceneRecord& scene = content.scenes[i];
-    const ModelRecord& model = content.models[scene.model];
-    if (draws_nothing(scene, model, content.chunks, content.materials)) {
+    if (draws_nothing(content, scene)) {
       doubt("scene.unseen", scene,
-            "nothing of the model is drawn for those who look at its pattern",
-            "turn it (turn=180:0:0), or make its materials two-sided or opaque");
+            "nothing of the model is drawn for those who look at its pattern from the front",
+            "turn it (turn=180, or turn=180:0:0), or make its materials two-sided or opaque");
     }
     const auto repeats = [&](const SceneRecord& other) {
       return scene.pattern == other.pattern && scene.model == other.model &&

@@ -1,9 +1,7 @@
 // The place of a scene's model on its pattern: from what the user said to the scene's record.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -48,24 +46,10 @@ Result<SceneRequest> resolve_scene(const SceneRequest& request, const BundleCont
 SceneRecord place_scene(const SceneRequest& resolved, const BundleContent& content,
                         std::uint32_t pattern, const PlacedModel& model);
 
-/// Whether nothing of a scene's model is drawn for those who look at the pattern: its chunks show
-/// them the backs of one-sided materials, or are transparent. chunks, materials: of the bundle.
-bool draws_nothing(const SceneRecord& scene, const ModelRecord& model, const auto& chunks,
-                   const auto& materials) {
-  constexpr float kTurnedAway = -0.87f;  // cosine; from which on a normal shows its back
-  constexpr float kTransparent = 0.004f;
-  const glm::quat turn(scene.rotation[3], scene.rotation[0], scene.rotation[1], scene.rotation[2]);
-  for (std::uint32_t c = model.first_chunk; c < model.first_chunk + model.chunk_count; ++c) {
-    const ChunkRecord& chunk = chunks[c];
-    const MaterialRecord& material = materials[chunk.material];
-    if (material.opacity < kTransparent) continue;
-    if ((material.flags & kMaterialTwoSided) != 0 || !(chunk.cone_cutoff <= 1.0f)) return false;
-    const glm::vec3 axis(chunk.cone_axis[0], chunk.cone_axis[1], chunk.cone_axis[2]);
-    const float angle = std::acos(std::clamp((turn * axis).z, -1.0f, 1.0f));
-    if (angle - std::asin(chunk.cone_cutoff) <= std::acos(kTurnedAway)) return false;
-  }
-  return model.chunk_count > 0;
-}
+/// Whether nothing of a scene's model is drawn for those who look at it from the front: it shows
+/// them the backs of one-sided materials, or is transparent. False for one that moves.
+bool draws_nothing(const BundleContent& content, const SceneRecord& scene);
+bool draws_nothing(const BundleView& bundle, const SceneRecord& scene);
 
 /// Warnings of scenes whose model nobody will see, and of those that repeat another.
 std::vector<Diagnostic> doubtful_scenes(const BundleContent& content);
