@@ -24,6 +24,7 @@ constexpr double kJoinPixels = 3.0;
 // Gradient of an edge, steps of a colour channel per pixel. Higher loses weak sides, lower finds
 // more wrong figures.
 constexpr double kEdge = 3;
+constexpr double kDetail = 12;  // the same of detail
 // Share of an edge's strength that is left 3 pixels to either side: more is a shadow's.
 constexpr double kShadow = 0.6;
 // A figure: of the photo's area at least so much, and each corner so far from straight and closed.
@@ -129,6 +130,7 @@ double norm_of(const Point& a) {
 struct Gradients {
   cv::Mat dx;
   cv::Mat dy;
+  cv::Mat detail;  // where they are strong
 
   explicit Gradients(const cv::Mat& rgb) {
     std::array<cv::Mat, 3> channels;
@@ -147,6 +149,7 @@ struct Gradients {
       x.copyTo(dx, stronger);
       y.copyTo(dy, stronger);
     }
+    detail = dx.mul(dx) + dy.mul(dy) > kDetail * kDetail;
   }
 
   /// Across a line of that normal; 0 outside of the photo.
@@ -751,18 +754,17 @@ Point on_plane(const cv::Matx33d& plane, double x, double y) {
 /// The share of a figure that has detail, without the part of it that another figure covers.
 double detail_in(const Gradients& gradients, const std::array<Point, 4>& figure,
                  const std::optional<std::array<Point, 4>>& without = std::nullopt) {
-  constexpr double kDetail = 12;  // gradient, steps of a colour channel per pixel
-  cv::Mat mask = cv::Mat::zeros(gradients.dx.size(), CV_8U);
   const std::vector<cv::Point> outline(figure.begin(), figure.end());
-  cv::fillConvexPoly(mask, outline, 255);
-  if (without)
-    cv::fillConvexPoly(mask, std::vector<cv::Point>(without->begin(), without->end()), 0);
-  const cv::Rect box = cv::boundingRect(outline) & cv::Rect(cv::Point(), mask.size());
+  const cv::Rect box = cv::boundingRect(outline) & cv::Rect(cv::Point(), gradients.detail.size());
   if (box.empty()) return 0;
-  cv::Mat strength;
-  cv::magnitude(gradients.dx(box), gradients.dy(box), strength);
-  mask = mask(box);
-  return cv::countNonZero((strength > kDetail) & mask) /
+  cv::Mat mask = cv::Mat::zeros(box.size(), CV_8U);
+  const auto fill = [&](std::vector<cv::Point> corners, int value) {
+    for (cv::Point& corner : corners) corner -= box.tl();
+    cv::fillConvexPoly(mask, corners, value);
+  };
+  fill(outline, 255);
+  if (without) fill({without->begin(), without->end()}, 0);
+  return cv::countNonZero(gradients.detail(box) & mask) /
          std::max(1.0, 1.0 * cv::countNonZero(mask));
 }
 
@@ -780,8 +782,8 @@ struct Placement {
   std::array<double, 4> margins{};  // of each side, from the other figure's
   std::array<double, 4> turns{};    // of each side against the other figure's: sines, ascending
 
-  Placement(const std::array<Point, 4>& outer, const std::array<Point, 4>& inner) {
-    const cv::Matx33d back = plane_of(outer).inv();
+  /// back: from the photo to that plane.
+  Placement(const cv::Matx33d& back, const std::array<Point, 4>& inner) {
     std::array<double, 4> x{};
     std::array<double, 4> y{};
     for (std::size_t i = 0; i < 4; ++i) {
@@ -809,13 +811,13 @@ struct Placement {
   [[nodiscard]] bool flush() const {
     return *std::min_element(margins.begin(), margins.end()) < kLeastMargin;
   }
-  /// Whether three sides are those of another figure.
-  [[nodiscard]] bool alike(const Placement& other) const {
+  /// How many sides are those of another figure.
+  [[nodiscard]] int shared(const Placement& other) const {
     int same = 0;
     for (std::size_t i = 0; i < 4; ++i) {
       same += std::fabs(margins[i] - other.margins[i]) < kLeastMargin ? 1 : 0;
     }
-    return same > 2;
+    return same;
   }
 };
 
@@ -823,7 +825,7 @@ struct Placement {
 /// other print around. Tables and mats have little detail, and objects on them are askew.
 bool is_printed(const Gradients& gradients, const std::array<Point, 4>& sheet,
                 const std::array<Point, 4>& inner) {
-  const Placement place(sheet, inner);
+  const Placement place(plane_of(sheet).inv(), inner);
   return (place.flush() || place.parallel()) &&
          detail_in(gradients, grown(sheet, 0.96), grown(inner, 1.06)) > kLeastPrint;
 }
@@ -849,11 +851,13 @@ bool is_held(const Gradients& gradients, const std::array<Point, 4>& ground,
 
 /// The figures in the middle of another one, as the picture within a border is.
 std::vector<Placement> centred_in(const Gradients& gradients, const std::vector<Figure>& figures,
-                                  const std::array<Point, 4>& corners) {
+                                  const cv::Matx33d& back) {
   std::vector<Placement> out;
   for (const Figure& figure : figures) {
-    const Placement place(corners, figure.corners);
-    if (place.centred() && !place.flush() && sharp_around(gradients, figure.corners) > kSharpHeld) {
+    const Placement place(back, figure.corners);
+    if (place.centred() && !place.flush() &&
+        ranges::none_of(out, [&](const Placement& other) { return place.shared(other) == 4; }) &&
+        sharp_around(gradients, figure.corners) > kSharpHeld) {
       out.push_back(place);
     }
   }
@@ -863,18 +867,22 @@ std::vector<Placement> centred_in(const Gradients& gradients, const std::vector<
 /// Whether a figure of edges is on a ground that has few on each of its sides, unlike the figure.
 bool holds_a_figure(const Gradients& gradients, const std::vector<Figure>& figures,
                     const std::array<Point, 4>& corners) {
-  constexpr double kTimesMore = 3;   // share of the figure that has detail against the ground's
-  constexpr std::size_t kMost = 20;  // figures that are looked at
-  const std::vector<Placement> centred = centred_in(gradients, figures, corners);
+  constexpr double kTimesMore = 3;    // share of the figure that has detail against the ground's
+  constexpr std::size_t kMost = 400;  // figures that are measured, the best first
+  const cv::Matx33d back = plane_of(corners).inv();
+  const std::vector<Placement> centred = centred_in(gradients, figures, back);
   std::size_t seen = 0;
   for (const Figure& figure : figures) {
     const std::array<Point, 4>& c = figure.corners;
-    if (!is_held(gradients, corners, c)) continue;
-    const Placement place(corners, c);
+    const double share = area_of(c) / area_of(corners);
+    if (share < kLeastHeld || share > kMostHeld) continue;
+    const Placement place(back, c);
     if (place.centred() ||
-        ranges::any_of(centred, [&](const Placement& other) { return place.alike(other); })) {
+        ranges::any_of(centred, [&](const Placement& one) { return place.shared(one) > 2; })) {
       continue;
     }
+    if (++seen > kMost) break;
+    if (!is_held(gradients, corners, c)) continue;
     const std::array<Point, 4> near = grown(c, 1.06);
     const std::array<Point, 4> far = grown(c, 1.2);
     double ground = 0;
@@ -883,7 +891,6 @@ bool holds_a_figure(const Gradients& gradients, const std::vector<Figure>& figur
       ground = std::max(ground, detail_in(gradients, {near[i], near[k], far[k], far[i]}));
     }
     if (detail_in(gradients, grown(c, 0.92)) > kTimesMore * ground) return true;
-    if (++seen == kMost) break;
   }
   return false;
 }
