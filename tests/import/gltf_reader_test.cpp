@@ -281,6 +281,22 @@ TEST_F(Gltf, RequiredExtensionsAreReadOrRefusedByName) {
             "for another pose, apply it to the model and export it again");
 }
 
+TEST_F(Gltf, TheAlphaOfVerticesIsMissedWhereItWouldShow) {
+  for (const std::string mode : {"OPAQUE", "BLEND"}) {
+    const auto model = read(
+        R"("bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":12}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+        {"bufferView":1,"componentType":5121,"normalized":true,"count":3,"type":"VEC4"}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0,"COLOR_0":1},"material":0}]}],
+        "materials":[{"alphaMode":")" +
+            mode + R"("}],"nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])",
+        raw<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}) +
+            raw<std::uint8_t>({255, 0, 0, 100, 255, 0, 0, 100, 255, 0, 0, 100}));
+    ASSERT_TRUE(model) << to_line(model.error());
+    EXPECT_EQ(model->diagnostics.empty(), mode == "OPAQUE") << mode;
+  }
+}
+
 TEST_F(Gltf, AnEmptyPictureIsReportedAndRefusesNothing) {
   const auto model = read(
       std::string(kOneTriangle) +

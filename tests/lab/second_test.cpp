@@ -172,6 +172,17 @@ TEST_F(SecondTest, ColoursAreReadAsTheBakeReadsThem) {
   }
 }
 
+TEST_F(SecondTest, SheetsWrittenInBothWindingsAreApart) {
+  std::string both = replaced(kObj, "usemtl red\n", "usemtl red\ns 1\n");
+  std::string backs = "usemtl red\n";
+  for (const char* const face :
+       {"1 2 3 4", "5 6 2 1", "6 7 3 2", "7 8 4 3", "8 5 1 4", "8 7 6 5"}) {
+    backs += std::string("f ") + face + "\n";
+  }
+  const std::string path = write("doubled.obj", both + backs);
+  EXPECT_EQ(issues(path, path), Ids()) << details_;
+}
+
 TEST_F(SecondTest, PolygonsThatGoAroundAgainAreOneRound) {
   const std::string path =
       write("again.obj", replaced(kObj, "f 4 3 2 1\n", "f 4 3 2 1 4 3 2 1 4 3 2 1 4\n"));

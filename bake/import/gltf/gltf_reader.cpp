@@ -275,7 +275,9 @@ class SceneReader {
                         ways_of(morphs, v, glm::dmat3(*place)));
     }
     any_colours_ = any_colours_ || has_colours;
-    if (has_colours && has_alpha(colours, positions.size())) ++left_out_.vertex_alphas;
+    if (has_colours && !opaque(primitive.material) && has_alpha(colours, positions.size())) {
+      ++left_out_.vertex_alphas;
+    }
     begin_material(primitive.material);
     if (parts_.any())
       parts_.begin_faces(model_.corner_positions.size() / 3,
@@ -298,6 +300,13 @@ class SceneReader {
   [[nodiscard]] glm::dmat4 stored_place(const VertexPlaces& places, std::uint32_t group,
                                         const glm::dmat4& copy) const {
     return places.skinned() ? parts_.group(group).to_stored : parts_.to_stored(node_) * copy;
+  }
+
+  /// Nothing of such a material shows what is behind it, whatever its alpha.
+  [[nodiscard]] bool opaque(int material) const {
+    const auto number = static_cast<std::size_t>(material);
+    return material < 0 || number >= gltf_.materials.size() ||
+           gltf_.materials[number].alphaMode == "OPAQUE";
   }
 
   static bool has_alpha(const GltfAccessor& colours, std::size_t count) {

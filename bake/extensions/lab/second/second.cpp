@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <set>
 #include <span>
 #include <system_error>
 
@@ -138,15 +139,60 @@ class Finisher {
     if (from.normal >= 0)
       to.normal = direction(mesh_.normals[static_cast<std::size_t>(from.normal)]);
     if (to.normal != dvec3(0)) return to;
+    const std::set<const Face*> sheet = sheet_of(face, shares_[position], from.position);
     for (const Share& share : shares_[position]) {
       const bool joined =
           face.smoothing < 0 ? glm::dot(share.normal, flat) >= least_cosine_ : face.smoothing > 0;
-      if (joined && share.face->smoothing == face.smoothing)
-        to.normal += share.weight * share.normal;
+      if (joined && sheet.contains(share.face)) to.normal += share.weight * share.normal;
     }
     to.normal = direction(to.normal);
     if (to.normal == dvec3(0)) to.normal = flat;
     return to;
+  }
+
+  /// The same face, wound the other way.
+  static bool twins(const Face& a, const Face& b) {
+    std::vector<int> first, second;
+    for (const Corner& corner : a.corners) first.push_back(corner.position);
+    for (const Corner& corner : b.corners) second.insert(second.begin(), corner.position);
+    const auto start = std::ranges::find(second, first[0]);
+    std::rotate(second.begin(), start, second.end());
+    return first == second;
+  }
+
+  /// Next to each other around a position, wound alike.
+  static bool continues(const Face& a, const Face& b, int at) {
+    const auto next = [at](const Face& face, std::size_t step) {
+      const std::size_t count = face.corners.size();
+      std::size_t i = 0;
+      while (face.corners[i].position != at) ++i;
+      return face.corners[(i + step) % count].position;
+    };
+    return next(a, 1) == next(b, b.corners.size() - 1) ||
+           next(a, a.corners.size() - 1) == next(b, 1);
+  }
+
+  /// Faces of its group around a position: where sheets are written in both windings, of its own.
+  static std::set<const Face*> sheet_of(const Face& face, const std::vector<Share>& shares,
+                                        int at) {
+    std::set<const Face*> group;
+    bool doubled = false;
+    for (const Share& share : shares) {
+      if (share.face->smoothing != face.smoothing) continue;
+      group.insert(share.face);
+      doubled = doubled || twins(face, *share.face);
+    }
+    if (!doubled) return group;
+    std::set<const Face*> sheet;
+    for (std::vector<const Face*> left = {&face}; !left.empty();) {
+      const Face& last = *left.back();
+      left.pop_back();
+      if (!sheet.insert(&last).second) continue;
+      for (const Face* other : group) {
+        if (continues(last, *other, at) && !twins(last, *other)) left.push_back(other);
+      }
+    }
+    return sheet;
   }
 
   const Mesh& mesh_;
