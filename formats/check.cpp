@@ -80,8 +80,8 @@ void SectionHash::finish() {
   if (XXH64_digest(&state_->xxh) == entry_->hash) return;
   log_.add(Rule::kSectionHash, entry_->offset,
            "section " + std::to_string(entry_ - parts_.sections.data()),
-           "the hash of its " + std::to_string(entry_->size) + " bytes of type " +
-               std::to_string(entry_->type) + " differs from the stated one");
+           "the hash of its {} bytes of type {} differs from the stated one",
+           {entry_->size, entry_->type});
 }
 
 /// Gives back whole pages; the last one may hold the start of the next range.
@@ -106,7 +106,7 @@ void check_section_bytes(FaultLog& log, const BundleParts& parts, const CheckOpt
   std::uint64_t end = sizeof(FileHeader) + parts.sections.size_bytes();
   for (std::uint32_t i = 0; i < parts.sections.size(); ++i) {
     const SectionEntry& entry = parts.sections[i];
-    const std::string where = "section " + std::to_string(i);
+    const std::string where = with_numbers("section {}", {i});
     check_zero(log, parts.bytes, end, entry.offset, "before " + where);
     end = entry.offset + entry.size;
     if (&entry != great(SectionType::kVertices) && &entry != great(SectionType::kIndices)) {
@@ -114,8 +114,8 @@ void check_section_bytes(FaultLog& log, const BundleParts& parts, const CheckOpt
     }
     if (entry.type == static_cast<std::uint32_t>(SectionType::kMeta)) check_meta(log, parts, entry);
     if (!known_section_type(entry.type) && (entry.flags & kSectionRequired) == 0) {
-      log.add(Rule::kUnknownSection, entry.offset, where,
-              "type " + std::to_string(entry.type) + ", " + std::to_string(entry.size) + " bytes");
+      log.add(Rule::kUnknownSection, entry.offset, where, "type {}, {} bytes",
+              {entry.type, entry.size});
     }
   }
 }
@@ -137,13 +137,12 @@ void check_counts(FaultLog& log, const BundleParts& parts, const ModelRecord& mo
   }
   if (model.triangle_count != triangles || model.vertex_count > vertices ||
       model.level_count != levels) {
-    log.add(Rule::kModelCounts, offset_of(parts, &model.vertex_count),
-            label(parts, "model", model.name),
-            "it states " + std::to_string(model.vertex_count) + " vertices, " +
-                std::to_string(model.triangle_count) + " triangles, " +
-                std::to_string(model.level_count) + " levels; its chunks have at most " +
-                std::to_string(vertices) + ", exactly " + std::to_string(triangles) + " and " +
-                std::to_string(levels));
+    log.add(
+        Rule::kModelCounts, offset_of(parts, &model.vertex_count),
+        label(parts, "model", model.name),
+        "it states {} vertices, {} triangles, {} levels; its chunks have at most {}, exactly {} "
+        "and {}",
+        {model.vertex_count, model.triangle_count, model.level_count, vertices, triangles, levels});
   }
 }
 
@@ -302,8 +301,7 @@ void check_referenced(FaultLog& log, const BundleParts& parts, Rule rule,
     if (covered + 3 >= buffer.size()) return;
     if (covered == before) {
       log.add(rule, offset_of(parts, buffer.data()) + covered, "buffer",
-              "no level refers to byte " + std::to_string(covered) + " of " +
-                  std::to_string(buffer.size()));
+              "no level refers to byte {} of {}", {covered, buffer.size()});
       return;
     }
   }
@@ -395,10 +393,9 @@ struct Range {
 void check_sides(FaultLog& log, const BundleParts& parts, const TextureRecord& texture) {
   const bool powers = is_power_of_two(texture.width) && is_power_of_two(texture.height);
   if (powers || (texture.level_count == 1 && (texture.flags & kTextureRepeat) == 0)) return;
-  log.add(
-      Rule::kTextureSides, offset_of(parts, &texture.width), label(parts, "texture", texture.name),
-      std::to_string(texture.width) + " x " + std::to_string(texture.height) + " pixels, " +
-          std::to_string(texture.level_count) + " levels, flags " + std::to_string(texture.flags));
+  log.add(Rule::kTextureSides, offset_of(parts, &texture.width),
+          label(parts, "texture", texture.name), "{} x {} pixels, {} levels, flags {}",
+          {texture.width, texture.height, texture.level_count, texture.flags});
 }
 
 void check_blocks(FaultLog& log, const BundleParts& parts, const TextureRecord& texture,
@@ -420,17 +417,17 @@ void check_blocks(FaultLog& log, const BundleParts& parts, const TextureRecord& 
   for (auto range = ranges.begin(); range != end; ++range) {
     if (range->first < covered) {
       log.add(Rule::kTextureOverlap, data.offset + range->first, where,
-              "a level starts at byte " + std::to_string(range->first) + ", before byte " +
-                  std::to_string(covered) + " where another ends");
+              "a level starts at byte {}, before byte {} where another ends",
+              {range->first, covered});
     } else if (range->first > covered) {
       log.add(Rule::kTextureUnreferenced, data.offset + covered, where,
-              std::to_string(range->first - covered) + " bytes belong to no level");
+              "{} bytes belong to no level", {range->first - covered});
     }
     covered = std::max(covered, range->end);
   }
   if (covered < data.size) {
-    log.add(Rule::kTextureUnreferenced, data.offset + covered, where,
-            std::to_string(data.size - covered) + " bytes belong to no level");
+    log.add(Rule::kTextureUnreferenced, data.offset + covered, where, "{} bytes belong to no level",
+            {data.size - covered});
   }
 }
 
@@ -471,10 +468,9 @@ bool can_run(const ParameterSetRecord& set) {
 void check_parameter_set(FaultLog& log, const BundleParts& parts, const ParameterSetRecord& set) {
   const std::uint32_t bits = is_orb(set) ? 256 : 512;
   if (set.descriptor_bits != bits) {
-    log.add(
-        Rule::kDescriptorLength, offset_of(parts, &set.descriptor_bits),
-        label(parts, "parameter set", set.name),
-        std::to_string(set.descriptor_bits) + " bits, the detector makes " + std::to_string(bits));
+    log.add(Rule::kDescriptorLength, offset_of(parts, &set.descriptor_bits),
+            label(parts, "parameter set", set.name), "{} bits, the detector makes {}",
+            {set.descriptor_bits, bits});
   }
   if (!can_run(set)) {
     log.add(Rule::kParameterValues, offset_of(parts, &set), label(parts, "parameter set", set.name),
@@ -508,7 +504,7 @@ void check_twin(FaultLog& log, const BundleParts& parts, const ParameterSetRecor
   }
   const auto tell = [&](Rule rule, const Tally& tally) {
     if (tally.count == 0) return;
-    log.add(rule, tally.first, where, std::to_string(tally.count) + " keypoints");
+    log.add(rule, tally.first, where, "{} keypoints", {tally.count});
   };
   tell(Rule::kKeypointValues, values);
   tell(Rule::kKeypointOutside, outside);
@@ -557,9 +553,8 @@ void check_picture(FaultLog& log, const BundleParts& parts, const PatternRecord&
                       std::memcmp(bytes.data() + 8, "WEBP", 4) == 0;
   if (framed) std::memcpy(&size, bytes.data() + 4, sizeof size);
   if (framed && bytes.size() <= kMaxPatternPicture && bytes.size() == std::size_t{size} + 8) return;
-  log.add(
-      Rule::kPattern, entry.offset, label(parts, "pattern", pattern.name),
-      "its picture is not a WebP file of at most " + std::to_string(kMaxPatternPicture) + " bytes");
+  log.add(Rule::kPattern, entry.offset, label(parts, "pattern", pattern.name),
+          "its picture is not a WebP file of at most {} bytes", {kMaxPatternPicture});
 }
 
 /// The twins of a pattern are adjacent in the section table.
@@ -631,7 +626,7 @@ void check_draw_orders(FaultLog& log, const BundleParts& parts) {
     const auto* first = reinterpret_cast<const DrawOrderRecord*>(bytes.data());
     const LevelRecord& level = parts.levels[parts.chunks[entry.owner].first_level];
     if (is_tree({first, bytes.size() / sizeof *first}, level.index_count / 3)) continue;
-    log.add(Rule::kChunkRange, entry.offset, "chunk " + std::to_string(entry.owner),
+    log.add(Rule::kChunkRange, entry.offset, with_numbers("chunk {}", {entry.owner}),
             "its draw order is not a tree that holds each triangle once");
   }
 }
@@ -649,7 +644,7 @@ void check_minor(FaultLog& log, const BundleParts& parts, bool accept_newer) {
   for (const TextureRecord& texture : parts.textures) {
     needed = std::max(needed, flags_since("TextureRecord", texture.flags));
   }
-  const std::string states = "it states 1." + std::to_string(header.minor) + ", ";
+  const std::string states = with_numbers("it states 1.{}, ", {header.minor});
   if (header.minor < needed) {
     log.add(Rule::kMinor, offsetof(FileHeader, minor), "header",
             states + "and uses what 1." + std::to_string(needed) + " added");

@@ -278,7 +278,7 @@ class GeometryCheck {
     if (outside.count == 0) return;
     log_.add(Rule::kChunkCone,
              offset_of(parts_, parts_.indices.data() + level.index_offset + 2ull * outside.first),
-             where(), std::to_string(outside.count) + " triangles face out of the cone");
+             where(), "{} triangles face out of the cone", {outside.count});
   }
 
   /// A fast scan of all indices and of all vertices between the least and the greatest, used or

@@ -225,7 +225,7 @@ void check_summary(FaultLog& log, const BundleParts& parts) {
             });
   if (read >= text.size()) return;
   log.add(Rule::kContentSummary, entry->offset + read, "content summary",
-          std::to_string(text.size() - read) + " bytes follow its last line");
+          "{} bytes follow its last line", {text.size() - read});
 }
 
 }  // namespace modar

@@ -111,22 +111,28 @@ std::string error_code(const IssueKind& kind) {
   return code;
 }
 
-void FaultLog::add(Rule rule, std::uint64_t offset, std::string where, std::string detail) {
+void FaultLog::add(Rule rule, std::uint64_t offset, std::string_view where, const char* detail,
+                   std::initializer_list<std::uint64_t> numbers) {
+  add(rule, offset, where, std::string_view(with_numbers(detail, numbers)));
+}
+
+void FaultLog::add(Rule rule, std::uint64_t offset, std::string_view where,
+                   std::string_view detail) {
   constexpr std::size_t kOpening = kOpeningKinds.size();
   const auto number = static_cast<std::size_t>(rule);
   const IssueKind& kind = number < kOpening ? kOpeningKinds[number] : content_[number - kOpening];
   const bool is_error = kind.severity == Severity::kError;
   if (sink_ != nullptr) {
     if (is_error) ++errors_;
-    (*sink_)(Issue{&kind, std::move(where), offset, std::move(detail), std::nullopt});
+    (*sink_)(Issue{&kind, std::string(where), offset, std::string(detail), std::nullopt});
     return;
   }
   if (!is_error || errors_++ > 0) return;
   const bool unsupported =
       rule == Rule::kVersion || rule == Rule::kSectionRequired || rule == Rule::kSectionVersion;
   first_ = Error{unsupported ? ExitCode::kUnsupported : ExitCode::kInvalidInput, error_code(kind),
-                 "byte " + std::to_string(offset) + " (" + where + ")",
-                 kind.message + (": " + detail), kind.cure};
+                 with_numbers("byte {} (", {offset}) + std::string(where) + ")",
+                 kind.message + (": " + std::string(detail)), kind.cure};
 }
 
 std::string rough_number_text(double value) {

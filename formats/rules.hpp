@@ -108,7 +108,10 @@ class FaultLog {
   /// `sink` must outlive the log.
   explicit FaultLog(const IssueSink& sink) : sink_(&sink), content_(content_issue_kinds()) {}
 
-  void add(Rule rule, std::uint64_t offset, std::string where, std::string detail);
+  void add(Rule rule, std::uint64_t offset, std::string_view where, std::string_view detail);
+  /// detail, numbers: as with_numbers() takes them.
+  void add(Rule rule, std::uint64_t offset, std::string_view where, const char* detail,
+           std::initializer_list<std::uint64_t> numbers = {});
   /// True once there is nothing more to be gained from looking on.
   [[nodiscard]] bool stop() const { return sink_ == nullptr && errors_ > 0; }
   [[nodiscard]] bool clean() const { return errors_ == 0; }

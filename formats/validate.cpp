@@ -36,13 +36,13 @@ std::uint64_t header_hash(std::span<const std::byte> bytes, const FileHeader& he
 
 /// The fields that decide whether the rest of the file can be looked at. False: it cannot.
 bool readable(std::span<const std::byte> bytes, FaultLog& log) {
-  const auto refuse = [&log](Rule rule, std::uint64_t offset, std::string detail) {
-    log.add(rule, offset, "header", std::move(detail));
+  const auto refuse = [&log](Rule rule, std::uint64_t offset, std::string_view detail) {
+    log.add(rule, offset, "header", detail);
     return false;
   };
   if (bytes.size() < sizeof(FileHeader)) {
     return refuse(Rule::kTruncated, bytes.size(),
-                  "the file has " + std::to_string(bytes.size()) + " bytes, a header has 64");
+                  with_numbers("the file has {} bytes, a header has 64", {bytes.size()}));
   }
   if (reinterpret_cast<std::uintptr_t>(bytes.data()) % alignof(std::uint64_t) != 0) {
     return refuse(Rule::kHeader, 0, "the first byte is at an address that 8 does not divide");
@@ -53,12 +53,12 @@ bool readable(std::span<const std::byte> bytes, FaultLog& log) {
   }
   if (header.major != kMajorVersion) {
     return refuse(Rule::kVersion, offsetof(FileHeader, major),
-                  "the file has version " + std::to_string(header.major) + "." +
-                      std::to_string(header.minor) + ", this program reads 1.x");
+                  with_numbers("the file has version {}.{}, this program reads 1.x",
+                               {header.major, header.minor}));
   }
   const auto sizes = [&] {
-    return "the header states " + std::to_string(header.file_size) + " bytes, the file has " +
-           std::to_string(bytes.size());
+    return with_numbers("the header states {} bytes, the file has {}",
+                        {header.file_size, bytes.size()});
   };
   if (bytes.size() < header.file_size) return refuse(Rule::kTruncated, bytes.size(), sizes());
   if (bytes.size() > header.file_size) {
@@ -71,7 +71,7 @@ bool readable(std::span<const std::byte> bytes, FaultLog& log) {
   if (header.section_count > kMaxSections ||
       header.section_count > (bytes.size() - sizeof(FileHeader)) / sizeof(SectionEntry)) {
     return refuse(Rule::kSectionCount, offsetof(FileHeader, section_count),
-                  std::to_string(header.section_count) + " sections do not fit");
+                  with_numbers("{} sections do not fit", {header.section_count}));
   }
   return true;
 }
@@ -79,31 +79,29 @@ bool readable(std::span<const std::byte> bytes, FaultLog& log) {
 /// Type, version, flags and owner of one entry.
 void check_kind(const RecordCheck& check, const SectionEntry& entry, bool newer) {
   if (!newer && (entry.flags & ~(kSectionRequired | kSectionGpu)) != 0) {
-    check.fault(Rule::kReserved, &entry.flags,
-                "flags " + std::to_string(entry.flags) + " have unknown bits");
+    check.fault(Rule::kReserved, &entry.flags, "flags {} have unknown bits", {entry.flags});
   }
   check.reserved(&entry.reserved, sizeof(entry.reserved));
   const SectionInfo* known = section_info(entry.type);
   if (known == nullptr) {
     if ((entry.flags & kSectionRequired) != 0) {
-      check.fault(Rule::kSectionRequired, &entry.type,
-                  "section type " + std::to_string(entry.type) + " is required and unknown");
+      check.fault(Rule::kSectionRequired, &entry.type, "section type {} is required and unknown",
+                  {entry.type});
     }
     return;
   }
   if (entry.version != 1) {
     check.fault(Rule::kSectionVersion, &entry.version,
-                "section type " + std::to_string(entry.type) + " has version " +
-                    std::to_string(entry.version) + ", this program reads 1");
+                "section type {} has version {}, this program reads 1",
+                {entry.type, entry.version});
   }
   if ((entry.flags & (kSectionRequired | kSectionGpu)) != known->flags) {
-    check.fault(Rule::kSectionFlags, &entry.flags,
-                "section type " + std::to_string(entry.type) + " has flags " +
-                    std::to_string(entry.flags) + ", not " + std::to_string(known->flags));
+    check.fault(Rule::kSectionFlags, &entry.flags, "section type {} has flags {}, not {}",
+                {entry.type, entry.flags, known->flags});
   }
   if (known->owner == SectionOwner::kNothing && (entry.owner != kNone || entry.variant != 0)) {
-    check.fault(Rule::kSectionOwner, &entry.owner,
-                "section type " + std::to_string(entry.type) + " belongs to no record");
+    check.fault(Rule::kSectionOwner, &entry.owner, "section type {} belongs to no record",
+                {entry.type});
   }
 }
 
@@ -113,16 +111,14 @@ bool check_place(const RecordCheck& check, const SectionEntry& entry, std::uint6
   const std::uint64_t alignment =
       (entry.flags & kSectionGpu) != 0 ? kGpuAlignment : kSectionAlignment;
   if (entry.offset % alignment != 0) {
-    check.fault(Rule::kSectionUnaligned, &entry.offset,
-                "offset " + std::to_string(entry.offset) + " is no multiple of " +
-                    std::to_string(alignment));
+    check.fault(Rule::kSectionUnaligned, &entry.offset, "offset {} is no multiple of {}",
+                {entry.offset, alignment});
     return false;
   }
   if (entry.offset < end || entry.offset > file_size || entry.size > file_size - entry.offset) {
     check.fault(Rule::kSectionRange, &entry.offset,
-                std::to_string(entry.size) + " bytes at " + std::to_string(entry.offset) +
-                    " are not between byte " + std::to_string(end) + " and the end, " +
-                    std::to_string(file_size));
+                "{} bytes at {} are not between byte {} and the end, {}",
+                {entry.size, entry.offset, end, file_size});
     return false;
   }
   return true;
@@ -135,26 +131,25 @@ bool find_header(FaultLog& log, const BundleParts& parts, SectionType type, std:
   const SectionEntry* entry = find_section(parts.sections, type, kNone, 0);
   if (entry == nullptr) return true;
   const std::span<const std::byte> bytes = section_bytes(parts, *entry);
-  const auto refuse = [&](std::string detail) {
-    log.add(Rule::kTableShape, entry->offset, "section type " + std::to_string(entry->type),
-            std::move(detail));
+  const auto refuse = [&](std::string_view detail) {
+    log.add(Rule::kTableShape, entry->offset, with_numbers("section type {}", {entry->type}),
+            detail);
     return false;
   };
   if (bytes.size() < sizeof(TableHeader)) return refuse("it is too small for a table's header");
   const auto& header = *reinterpret_cast<const TableHeader*>(bytes.data());
   if (header.stride < size || header.stride % 8 != 0 ||
       (header.stride != size && !newer_minor(parts))) {
-    return refuse("its records have " + std::to_string(header.stride) + " bytes, not " +
-                  std::to_string(size));
+    return refuse(with_numbers("its records have {} bytes, not {}", {header.stride, size}));
   }
   // Neither factor exceeds 32 bits, so the product cannot overflow.
   if (std::uint64_t{header.count} * header.stride != bytes.size() - sizeof(TableHeader)) {
-    return refuse(std::to_string(header.count) + " records of " + std::to_string(header.stride) +
-                  " bytes do not fill " + std::to_string(bytes.size()) + " bytes");
+    return refuse(with_numbers("{} records of {} bytes do not fill {} bytes",
+                               {header.count, header.stride, bytes.size()}));
   }
   if (header.reserved != 0 && !newer_minor(parts)) {
     log.add(Rule::kReserved, entry->offset + offsetof(TableHeader, reserved),
-            "section type " + std::to_string(entry->type), "a reserved field is not zero");
+            with_numbers("section type {}", {entry->type}), "a reserved field is not zero");
   }
   found = &header;
   return true;
@@ -248,9 +243,8 @@ bool validate_sections(std::span<const std::byte> bytes, FaultLog& log, BundlePa
     }
   }
   if (placed && !log.stop() && end != header.file_size) {
-    log.add(Rule::kFileSize, end, "header",
-            "the last section ends at byte " + std::to_string(end) + ", the file at " +
-                std::to_string(header.file_size));
+    log.add(Rule::kFileSize, end, "header", "the last section ends at byte {}, the file at {}",
+            {end, header.file_size});
   }
   return placed && !log.stop();
 }
@@ -298,14 +292,14 @@ bool validate_tables(FaultLog& log, BundleParts& parts) {
   return walkable && !log.stop();
 }
 
-void RecordCheck::fault(Rule rule, const void* field, std::string detail) const {
+void RecordCheck::fault(Rule rule, const void* field, std::string_view detail) const {
   const auto offset = static_cast<const std::byte*>(field) - parts_.bytes.data();
-  log_.add(rule, static_cast<std::uint64_t>(offset), what_ + (" " + std::to_string(index_)),
-           std::move(detail));
+  log_.add(rule, static_cast<std::uint64_t>(offset), what_ + with_numbers(" {}", {index_}), detail);
 }
 
-void RecordCheck::fault(Rule rule, const void* field, const char* detail) const {
-  fault(rule, field, std::string(detail));
+void RecordCheck::fault(Rule rule, const void* field, const char* detail,
+                        std::initializer_list<std::uint64_t> numbers) const {
+  fault(rule, field, std::string_view(with_numbers(detail, numbers)));
 }
 
 void RecordCheck::check_number(const void* field, const char* name, double value, double low,
@@ -326,7 +320,7 @@ void RecordCheck::reserved(const void* field, std::size_t bytes) const {
 
 void RecordCheck::flags(const std::uint32_t& field, std::uint32_t known) const {
   if ((field & ~known) == 0 || newer_minor(parts_)) return;
-  fault(Rule::kReserved, &field, "flags " + std::to_string(field) + " have unknown bits");
+  fault(Rule::kReserved, &field, "flags {} have unknown bits", {field});
 }
 
 void RecordCheck::name(const NameRef& ref) const {
@@ -337,10 +331,8 @@ void RecordCheck::name(const NameRef& ref) const {
   };
   if (ref.length > kMaxNameBytes || end > parts_.names.size() || !starts_character(ref.offset) ||
       !starts_character(end)) {
-    fault(Rule::kName, &ref,
-          std::to_string(ref.length) + " bytes at " + std::to_string(ref.offset) +
-              " are not whole characters of the " + std::to_string(parts_.names.size()) +
-              " bytes of names");
+    fault(Rule::kName, &ref, "{} bytes at {} are not whole characters of the {} bytes of names",
+          {ref.length, ref.offset, parts_.names.size()});
   }
 }
 
@@ -348,9 +340,8 @@ bool RecordCheck::range(Rule rule, const std::uint32_t& first, std::uint32_t cou
                         std::uint64_t expected, std::uint32_t size, const char* name) const {
   if (first == expected && std::uint64_t{first} + count <= size) return true;
   fault(rule, &first,
-        std::string(name) + " " + std::to_string(first) + " and " + std::to_string(count) +
-            " in all do not follow the " + std::to_string(expected) + " before them within " +
-            std::to_string(size));
+        name + with_numbers(" {} and {} in all do not follow the {} before them within {}",
+                            {first, count, expected, size}));
   return false;
 }
 
@@ -394,18 +385,17 @@ void check_attribute(const RecordCheck& check, const LayoutRecord& layout,
   check.reserved(&attribute.reserved, sizeof(attribute.reserved));
   if (!known_semantic(attribute.semantic) || size == 0 || attribute.normalised > 1) {
     return check.fault(Rule::kEnum, &attribute,
-                       "an attribute has semantic " + std::to_string(attribute.semantic) +
-                           ", type " + std::to_string(attribute.type) + ", normalised " +
-                           std::to_string(attribute.normalised));
+                       "an attribute has semantic {}, type {}, normalised {}",
+                       {attribute.semantic, attribute.type, attribute.normalised});
   }
   const std::uint32_t end = attribute.offset + size * attribute.components;
   if (!components_fit(attribute.semantic, attribute.components) ||
       (is_float(attribute.type) && attribute.normalised != 0) || attribute.offset % 2 != 0 ||
       attribute.offset % size != 0 || end > layout.stride) {
     check.fault(Rule::kLayout, &attribute,
-                "an attribute of " + std::to_string(attribute.components) + " components of " +
-                    std::to_string(size) + " bytes at " + std::to_string(attribute.offset) +
-                    " does not suit its meaning or the stride " + std::to_string(layout.stride));
+                "an attribute of {} components of {} bytes at {} does not suit its meaning or the "
+                "stride {}",
+                {attribute.components, size, attribute.offset, layout.stride});
   }
 }
 
@@ -424,9 +414,8 @@ void check_layout(const RecordCheck& check, const LayoutRecord& layout) {
   const std::uint32_t count = layout.attribute_count;
   if (layout.stride == 0 || layout.stride % 4 != 0 || layout.stride > kMaxVertexStride ||
       count == 0 || count > std::size(layout.attributes)) {
-    return check.fault(Rule::kLayout, &layout,
-                       "stride " + std::to_string(layout.stride) + " and " + std::to_string(count) +
-                           " attributes are not possible");
+    return check.fault(Rule::kLayout, &layout, "stride {} and {} attributes are not possible",
+                       {layout.stride, count});
   }
   std::uint32_t positions = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -434,8 +423,7 @@ void check_layout(const RecordCheck& check, const LayoutRecord& layout) {
     positions += layout.attributes[i].semantic == static_cast<std::uint8_t>(Semantic::kPosition);
     for (std::uint32_t j = 0; j < i; ++j) {
       if (collide(layout.attributes[i], layout.attributes[j])) {
-        check.fault(Rule::kLayout, &layout.attributes[i],
-                    "attributes " + std::to_string(j) + " and " + std::to_string(i) + " collide");
+        check.fault(Rule::kLayout, &layout.attributes[i], "attributes {} and {} collide", {j, i});
       }
     }
   }
@@ -456,8 +444,8 @@ void check_material(const RecordCheck& check, const BundleParts& parts,
   check.flags(material.flags, known_flags("MaterialRecord"));
   check.reserved(material.reserved, sizeof(material.reserved));
   if (material.texture != kNone && material.texture >= parts.textures.size()) {
-    check.fault(Rule::kMaterialRange, &material.texture,
-                "texture " + std::to_string(material.texture) + " is not there");
+    check.fault(Rule::kMaterialRange, &material.texture, "texture {} is not there",
+                {material.texture});
   }
 }
 
@@ -470,18 +458,16 @@ void check_level(const RecordCheck& check, const BundleParts& parts, const Level
       level.vertex_offset > parts.vertices.size() ||
       vertex_bytes > parts.vertices.size() - level.vertex_offset) {
     check.fault(Rule::kLevelRange, &level.vertex_offset,
-                std::to_string(level.vertex_count) + " vertices of " + std::to_string(stride) +
-                    " bytes at " + std::to_string(level.vertex_offset) + " are not in the " +
-                    std::to_string(parts.vertices.size()) + " bytes of vertices");
+                "{} vertices of {} bytes at {} are not in the {} bytes of vertices",
+                {level.vertex_count, stride, level.vertex_offset, parts.vertices.size()});
   }
   const std::uint64_t index_bytes = std::uint64_t{level.index_count} * 2;
   if (level.index_count % 3 != 0 || level.index_offset % 2 != 0 ||
       level.index_offset > parts.indices.size() ||
       index_bytes > parts.indices.size() - level.index_offset) {
     check.fault(Rule::kLevelRange, &level.index_offset,
-                std::to_string(level.index_count) + " indices at " +
-                    std::to_string(level.index_offset) + " are no triangles in the " +
-                    std::to_string(parts.indices.size()) + " bytes of indices");
+                "{} indices at {} are no triangles in the {} bytes of indices",
+                {level.index_count, level.index_offset, parts.indices.size()});
   }
 }
 
@@ -506,8 +492,8 @@ void check_chunk(const RecordCheck& check, const ModelRecord& model, const Chunk
   // The model's own range was held against the table before.
   if (chunk.material < model.first_material ||
       chunk.material - model.first_material >= model.material_count) {
-    check.fault(Rule::kMaterialRange, &chunk.material,
-                "material " + std::to_string(chunk.material) + " is not one of its model's");
+    check.fault(Rule::kMaterialRange, &chunk.material, "material {} is not one of its model's",
+                {chunk.material});
   }
 }
 
@@ -525,8 +511,7 @@ void check_model(const RecordCheck& check, const BundleParts& parts, const Model
   check.number(model.uv_error_rms_texels, "uv_error_rms_texels", 0.0);
   check.reserved(model.reserved, sizeof(model.reserved));
   if (model.layout >= parts.layouts.size()) {
-    check.fault(Rule::kModelRange, &model.layout,
-                "layout " + std::to_string(model.layout) + " is not there");
+    check.fault(Rule::kModelRange, &model.layout, "layout {} is not there", {model.layout});
   }
   if (std::uint64_t{model.first_material} + model.material_count > parts.materials.size()) {
     check.fault(Rule::kModelRange, &model.first_material, "its materials are not there");
@@ -578,11 +563,9 @@ void check_groups(FaultLog& log, const BundleParts& parts, NextPlaces& next) {
   }
   if (log.errors() != faults) return;
   if (next.chunk != chunks) {
-    log.add(Rule::kModelRange, 0, "chunks",
-            std::to_string(chunks - next.chunk) + " chunks belong to no model");
+    log.add(Rule::kModelRange, 0, "chunks", "{} chunks belong to no model", {chunks - next.chunk});
   } else if (next.level != levels) {
-    log.add(Rule::kChunkRange, 0, "levels",
-            std::to_string(levels - next.level) + " levels belong to no chunk");
+    log.add(Rule::kChunkRange, 0, "levels", "{} levels belong to no chunk", {levels - next.level});
   }
 }
 
@@ -610,8 +593,8 @@ void check_proxies(FaultLog& log, const BundleParts& parts, NextPlaces& next) {
     const RecordCheck check(log, parts, "proxy", i);
     check.reserved(&proxy.reserved, sizeof(proxy.reserved));
     if (proxy.model >= parts.models.size() || proxy.model < last) {
-      return check.fault(Rule::kProxy, &proxy.model,
-                         "model " + std::to_string(proxy.model) + " is not there or out of order");
+      return check.fault(Rule::kProxy, &proxy.model, "model {} is not there or out of order",
+                         {proxy.model});
     }
     last = proxy.model;
     if (!check.range(Rule::kProxy, proxy.first_chunk, proxy.chunk_count, next.chunk,
@@ -625,9 +608,8 @@ void check_proxies(FaultLog& log, const BundleParts& parts, NextPlaces& next) {
   }
   if (log.errors() == faults &&
       (next.chunk != parts.chunks.size() || next.level != parts.levels.size())) {
-    log.add(Rule::kProxy, 0, "proxies",
-            std::to_string(parts.chunks.size() - next.chunk) + " chunks and " +
-                std::to_string(parts.levels.size() - next.level) + " levels belong to none");
+    log.add(Rule::kProxy, 0, "proxies", "{} chunks and {} levels belong to none",
+            {parts.chunks.size() - next.chunk, parts.levels.size() - next.level});
   }
 }
 
@@ -654,8 +636,8 @@ void validate_models(FaultLog& log, const BundleParts& parts) {
   }
   if (index_bytes > parts.indices.size()) {
     log.add(Rule::kLevelRange, 0, "levels",
-            "levels use " + std::to_string(index_bytes) + " bytes of indices where " +
-                std::to_string(parts.indices.size()) + " are: some are shared");
+            "levels use {} bytes of indices where {} are: some are shared",
+            {index_bytes, parts.indices.size()});
   }
 }
 
@@ -682,22 +664,19 @@ void check_texture(const RecordCheck& check, const TextureRecord& texture) {
   }
   check.reserved(texture.reserved, sizeof(texture.reserved));
   if (find_texture_format(texture.format) == nullptr) {
-    check.fault(Rule::kEnum, &texture.format,
-                "format " + std::to_string(texture.format) + " is not known");
+    check.fault(Rule::kEnum, &texture.format, "format {} is not known", {texture.format});
   }
   const std::uint32_t side = std::max(texture.width, texture.height);
   if (std::min(texture.width, texture.height) == 0 || side > kMaxTextureSide ||
       std::min(texture.source_width, texture.source_height) == 0) {
-    check.fault(Rule::kTextureRange, &texture.width,
-                std::to_string(texture.width) + " x " + std::to_string(texture.height) +
-                    " pixels is not a possible size");
+    check.fault(Rule::kTextureRange, &texture.width, "{} x {} pixels is not a possible size",
+                {texture.width, texture.height});
     return;
   }
   const auto chain = static_cast<std::uint32_t>(bit_width(side));
   if (texture.level_count != 1 && texture.level_count != chain) {
     check.fault(Rule::kTextureRange, &texture.level_count,
-                std::to_string(texture.level_count) +
-                    " levels are neither 1 nor the full chain of " + std::to_string(chain));
+                "{} levels are neither 1 nor the full chain of {}", {texture.level_count, chain});
   }
 }
 
@@ -713,9 +692,8 @@ void check_texture_level(const RecordCheck& check, const TextureRecord& texture,
   const std::uint64_t size = format != nullptr ? format->bytes(width, height) : 0;
   if (level.width != width || level.height != height || level.size != size) {
     check.fault(Rule::kTextureLevel, &level.size,
-                std::to_string(level.width) + " x " + std::to_string(level.height) + " pixels in " +
-                    std::to_string(level.size) + " bytes are not " + std::to_string(width) + " x " +
-                    std::to_string(height) + " in " + std::to_string(size));
+                "{} x {} pixels in {} bytes are not {} x {} in {}",
+                {level.width, level.height, level.size, width, height, size});
   }
   const auto inside = [&](std::uint64_t offset) {
     return offset % 8 == 0 && offset <= data_size && level.size <= data_size - offset;
@@ -724,9 +702,8 @@ void check_texture_level(const RecordCheck& check, const TextureRecord& texture,
   if (!inside(level.offset) ||
       (alpha ? !inside(level.alpha_offset) : level.alpha_offset != kNoOffset)) {
     check.fault(Rule::kTextureLevel, &level.offset,
-                "its blocks at " + std::to_string(level.offset) + " or their alpha twin at " +
-                    std::to_string(level.alpha_offset) + " are not in the " +
-                    std::to_string(data_size) + " bytes of the texture");
+                "its blocks at {} or their alpha twin at {} are not in the {} bytes of the texture",
+                {level.offset, level.alpha_offset, data_size});
   }
 }
 
@@ -747,9 +724,8 @@ void check_textures(FaultLog& log, const BundleParts& parts) {
     }
   }
   if (log.clean() && next_level != parts.texture_levels.size()) {
-    log.add(
-        Rule::kTextureRange, 0, "texture levels",
-        std::to_string(parts.texture_levels.size() - next_level) + " levels belong to no texture");
+    log.add(Rule::kTextureRange, 0, "texture levels", "{} levels belong to no texture",
+            {parts.texture_levels.size() - next_level});
   }
 }
 
@@ -760,9 +736,8 @@ void check_pattern(const RecordCheck& check, const PatternRecord& pattern) {
   check.reserved(pattern.reserved, sizeof(pattern.reserved));
   const std::uint32_t side = std::max(pattern.width, pattern.height);
   if (std::min(pattern.width, pattern.height) == 0 || side > kMaxPatternSide) {
-    return check.fault(Rule::kPattern, &pattern.width,
-                       std::to_string(pattern.width) + " x " + std::to_string(pattern.height) +
-                           " pixels is not a possible size");
+    return check.fault(Rule::kPattern, &pattern.width, "{} x {} pixels is not a possible size",
+                       {pattern.width, pattern.height});
   }
   const double half_width = static_cast<double>(pattern.width) / side;
   const double half_height = static_cast<double>(pattern.height) / side;
@@ -785,11 +760,10 @@ void check_parameter_set(const RecordCheck& check, const BundleParts& parts, std
   check.reserved(set.reserved, sizeof(set.reserved));
   if (set.detector != static_cast<std::uint32_t>(Detector::kFastOrb) &&
       set.detector != static_cast<std::uint32_t>(Detector::kAgastBrisk)) {
-    check.fault(Rule::kEnum, &set.detector,
-                "detector " + std::to_string(set.detector) + " is not known");
+    check.fault(Rule::kEnum, &set.detector, "detector {} is not known", {set.detector});
   }
   if (set.harris > 1) {
-    check.fault(Rule::kEnum, &set.harris, "harris is " + std::to_string(set.harris));
+    check.fault(Rule::kEnum, &set.harris, "harris is {}", {set.harris});
   }
   if (index > 0 && parts.parameter_sets[index - 1].id >= set.id) {
     check.fault(Rule::kParameterSet, &set.id, "ids do not rise from set to set");
@@ -797,7 +771,7 @@ void check_parameter_set(const RecordCheck& check, const BundleParts& parts, std
   if (set.descriptor_bits == 0 || set.descriptor_bits % 8 != 0 ||
       set.descriptor_bits > kMaxDescriptorBits) {
     check.fault(Rule::kParameterSet, &set.descriptor_bits,
-                std::to_string(set.descriptor_bits) + " bits is not a possible descriptor size");
+                "{} bits is not a possible descriptor size", {set.descriptor_bits});
   }
 }
 
@@ -815,17 +789,15 @@ void check_twin(const RecordCheck& check, const BundleParts& parts, const Sectio
   const std::uint64_t second = header.descriptors_offset;
   if (header.descriptor_bytes != set.descriptor_bits / 8) {
     check.fault(Rule::kFeatures, &header.descriptor_bytes,
-                "descriptors of " + std::to_string(header.descriptor_bytes) +
-                    " bytes are not the " + std::to_string(set.descriptor_bits) +
-                    " bits of its parameter set");
+                "descriptors of {} bytes are not the {} bits of its parameter set",
+                {header.descriptor_bytes, set.descriptor_bits});
   }
   if (first != sizeof(FeatureHeader) || second % 16 != 0 || second > bytes.size() ||
       second < first + keypoint_bytes || second - first - keypoint_bytes >= 16 ||
       descriptor_bytes != bytes.size() - second) {
     check.fault(Rule::kFeatures, &header.keypoints_offset,
-                std::to_string(header.count) + " keypoints at " + std::to_string(first) +
-                    " and descriptors at " + std::to_string(second) + " do not fill its " +
-                    std::to_string(bytes.size()) + " bytes");
+                "{} keypoints at {} and descriptors at {} do not fill its {} bytes",
+                {header.count, first, second, bytes.size()});
   }
 }
 
@@ -843,8 +815,8 @@ void check_shadow(const RecordCheck& check, const BundleParts& parts, const Sect
   if (!sized || bytes.size() - sizeof(ShadowHeader) != header.width * header.height ||
       !(header.low[0] < header.high[0]) || !(header.low[1] < header.high[1])) {
     check.fault(Rule::kScene, &header.width,
-                std::to_string(header.width) + " x " + std::to_string(header.height) +
-                    " texels of a shadow do not fill its section, or its rectangle is empty");
+                "{} x {} texels of a shadow do not fill its section, or its rectangle is empty",
+                {header.width, header.height});
   }
 }
 
@@ -859,9 +831,8 @@ void check_colours(const RecordCheck& check, const BundleParts& parts, const Sec
                      std::max(header.columns, header.rows) <= kMaxColourCells;
   constexpr std::size_t kCell = 3 * sizeof(std::uint16_t);
   if (!sized || bytes.size() - sizeof header != header.columns * header.rows * kCell) {
-    check.fault(Rule::kPattern, &header.columns,
-                std::to_string(header.columns) + " x " + std::to_string(header.rows) +
-                    " colours do not fill their section");
+    check.fault(Rule::kPattern, &header.columns, "{} x {} colours do not fill their section",
+                {header.columns, header.rows});
   }
 }
 
@@ -900,8 +871,8 @@ void check_draw_order(const RecordCheck& check, const BundleParts& parts,
   }
   if (!good || found != triangles) {
     check.fault(Rule::kChunkRange, &entry.size,
-                "its draw order does not hold the " + std::to_string(triangles) +
-                    " triangles of chunk " + std::to_string(entry.owner));
+                "its draw order does not hold the {} triangles of chunk {}",
+                {triangles, entry.owner});
   }
 }
 
@@ -942,8 +913,8 @@ void check_owned_section(const RecordCheck& check, const BundleParts& parts,
   const std::uint32_t set = features ? find_parameter_set(parts.parameter_sets, entry.variant) : 0;
   if (entry.owner >= owners.count || set == kNone || (!features && entry.variant != 0)) {
     return check.fault(Rule::kSectionOwner, &entry.owner,
-                       owners.name + (" " + std::to_string(entry.owner)) +
-                           (features ? " or parameter set " + std::to_string(entry.variant) : "") +
+                       owners.name + (with_numbers(" {}", {entry.owner})) +
+                           (features ? with_numbers(" or parameter set {}", {entry.variant}) : "") +
                            " is not there");
   }
   switch (info->type) {
@@ -968,9 +939,8 @@ void check_scene(const RecordCheck& check, const BundleParts& parts, const Scene
   check.numbers(scene.rotation, "rotation");
   check.reserved(scene.reserved, sizeof(scene.reserved));
   if (scene.pattern >= parts.patterns.size() || scene.model >= parts.models.size()) {
-    check.fault(Rule::kScene, &scene.pattern,
-                "pattern " + std::to_string(scene.pattern) + " or model " +
-                    std::to_string(scene.model) + " is not there");
+    check.fault(Rule::kScene, &scene.pattern, "pattern {} or model {} is not there",
+                {scene.pattern, scene.model});
   }
   if (!unit_length(scene.rotation)) {
     check.fault(Rule::kScene, scene.rotation, "its rotation is not a unit quaternion");
@@ -1003,8 +973,7 @@ void check_light(const RecordCheck& check, const BundleParts& parts, std::uint32
   check.reserved(&light.reserved1, sizeof(light.reserved1));
   if (light.scene >= parts.scenes.size() ||
       (index > 0 && parts.lights[index - 1].scene >= light.scene)) {
-    check.fault(Rule::kScene, &light.scene,
-                "scene " + std::to_string(light.scene) + " is not there or out of order");
+    check.fault(Rule::kScene, &light.scene, "scene {} is not there or out of order", {light.scene});
   }
   if (!unit_length(light.direction)) {
     check.fault(Rule::kScene, light.direction, "the direction to its light has no unit length");
@@ -1030,8 +999,8 @@ void check_occlusion(const RecordCheck& check, const BundleParts& parts, std::ui
   }
   if (!good) {
     check.fault(Rule::kLayout, &record.layout,
-                "byte " + std::to_string(record.offset) + " of layout " +
-                    std::to_string(record.layout) + " is not free, or the layout out of order");
+                "byte {} of layout {} is not free, or the layout out of order",
+                {record.offset, record.layout});
   }
 }
 
@@ -1089,7 +1058,7 @@ Error wrong_section(const BundleView& bundle, const SectionEntry& entry) {
   FaultLog log;
   log.add(Rule::kSectionHash, entry.offset,
           "section " + std::to_string(&entry - bundle.sections().data()),
-          "it has " + std::to_string(entry.size) + " bytes of type " + std::to_string(entry.type));
+          "it has {} bytes of type {}", {entry.size, entry.type});
   return log.first();
 }
 

@@ -76,8 +76,10 @@ class RecordCheck {
   // Reports of faults are not inline: the player has a hundred calls of it.
 
   /// `field` points into the record.
-  void fault(Rule rule, const void* field, std::string detail) const;
-  void fault(Rule rule, const void* field, const char* detail) const;
+  void fault(Rule rule, const void* field, std::string_view detail) const;
+  /// detail, numbers: as with_numbers() takes them.
+  void fault(Rule rule, const void* field, const char* detail,
+             std::initializer_list<std::uint64_t> numbers = {}) const;
 
   /// Finite and within [low, high].
   template <class T>

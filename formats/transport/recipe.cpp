@@ -14,7 +14,7 @@ namespace modar {
 namespace {
 
 tl::unexpected<Error> broken(const char* code, std::size_t offset, const char* cause) {
-  return fail(ExitCode::kInvalidInput, code, "recipe, byte " + std::to_string(offset), cause,
+  return fail(ExitCode::kInvalidInput, code, with_numbers("recipe, byte {}", {offset}), cause,
               "publish the release again");
 }
 
@@ -130,7 +130,7 @@ Result<RecipeView> open_recipe(std::span<const std::byte> bytes) {
   }
   if (view.header.version < 1 || view.header.version > kRecipeVersion) {
     return fail(ExitCode::kUnsupported, "recipe.version", "recipe, byte 8",
-                "it is of version " + std::to_string(view.header.version) + ", not 1 or 2",
+                with_numbers("it is of version {}, not 1 or 2", {view.header.version}),
                 "use a newer modar-fetch");
   }
   if ((view.header.version == 1 && view.header.table_hash != 0) ||
