@@ -217,15 +217,6 @@ class Decimator {
 
  private:
   using Triangle = std::array<std::uint16_t, 3>;
-  /// Of a triangle: the vertex' next one, and the two vertices that follow it, which are equal
-  /// where the triangle is gone.
-  struct Corner {
-    std::uint32_t next = kNoIndex;
-    std::uint16_t a = 0;
-    std::uint16_t b = 0;
-    [[nodiscard]] bool is_gone() const { return a == b; }
-    void leave() { a = b; }
-  };
   /// Inside the surface, on a rim of it, or to be kept.
   enum class Kind : std::uint8_t { kInside, kRim, kLocked };
   /// Of a vertex: the collapse to try next; to itself where none is legal.
@@ -287,18 +278,7 @@ class Decimator {
   /// Calls back with the corner of each triangle at v and the two vertices that follow v in it.
   template <typename Callback>
   void around(std::uint16_t v, const Callback& callback) {
-    std::uint32_t* link = &all_[v].first;
-    while (*link != kNoIndex) {
-      const std::uint32_t number = *link;
-      Corner& corner = corners_[number];
-      if (corner.is_gone()) {
-        *link = corner.next;
-        continue;
-      }
-      callback(number, corner.a, corner.b);
-      link = &corner.next;
-      if (looks_left_ > 0) --looks_left_;
-    }
+    visit_fan(all_[v].first, corners_, looks_left_, callback);
   }
 
   /// A vertex whose triangles form one closed fan is inside, one with one open fan on a rim; others
@@ -337,12 +317,7 @@ class Decimator {
 
   /// A plane through the edge from v to w, across its only triangle.
   void add_rim_edge(std::uint16_t v, std::uint16_t w, std::uint16_t third) {
-    const glm::dvec3 edge = position(w) - position(v);
-    const glm::dvec3 across = glm::cross(glm::cross(edge, position(third) - position(v)), edge);
-    const double length = glm::length(across);
-    if (!(length > 0)) return;
-    const Quadric plane =
-        Quadric::of_plane(across / length, position(v), kRimWeight * glm::dot(edge, edge));
+    const Quadric plane = Quadric::of_border(position(v), position(w), position(third), 1.0);
     quadrics_[v] += plane;
     quadrics_[w] += plane;
   }
@@ -602,7 +577,7 @@ class Decimator {
 
   ChunkVertices vertices_;
   DecimateLimits limits_;
-  std::vector<Corner> corners_;  // three a triangle
+  std::vector<FanCorner<std::uint16_t>> corners_;  // three a triangle
   std::size_t alive_count_ = 0;
   std::vector<Vertex> all_;
   std::vector<Quadric> quadrics_;         // of each vertex

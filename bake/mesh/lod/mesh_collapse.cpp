@@ -168,33 +168,10 @@ void MeshCollapser::add_border(std::uint32_t f, std::uint32_t k, double weight) 
   std::size_t count = 0;
   around(v, [&](std::uint32_t, std::uint32_t a, std::uint32_t b) { count += a == w || b == w; });
   if (count != 1) return;
-  const glm::dvec3 edge = point_of(w) - point_of(v);
-  const glm::dvec3 third = point_of(at[(k + 2) % 3]) - point_of(v);
-  const glm::dvec3 across = glm::cross(glm::cross(edge, third), edge);
-  const double length = glm::length(across);
-  if (!(length > 0)) return;
   const Quadric plane =
-      Quadric::of_plane(across / length, point_of(v), weight * kRimWeight * glm::dot(edge, edge));
+      Quadric::of_border(point_of(v), point_of(w), point_of(at[(k + 2) % 3]), weight);
   places_[v].quadric += plane;
   places_[w].quadric += plane;
-}
-
-/// Calls back with each triangle at a place, by its corner there, and the two places that follow
-/// it.
-template <class Callback>
-void MeshCollapser::around(std::uint32_t place, const Callback& callback) {
-  std::uint32_t* link = &places_[place].first;
-  while (*link != kNoIndex) {
-    const std::uint32_t number = *link;
-    Corner& corner = corners_[number];
-    if (corner.is_gone()) {
-      *link = corner.next;
-      continue;
-    }
-    callback(number, corner.a, corner.b);
-    link = &corner.next;
-    if (looks_left_ > 0) --looks_left_;
-  }
 }
 
 std::uint32_t MeshCollapser::place_of(std::uint32_t place) {

@@ -150,15 +150,7 @@ class MeshCollapser {
     bool open = false;        ///< on an edge of one triangle
     bool several = false;     ///< has several looks
   };
-  /// Of a triangle: the place's next corner, and the two places that follow it, which are equal
-  /// where the triangle is gone.
-  struct Corner {
-    std::uint32_t next = kNoIndex;
-    std::uint32_t a = 0;
-    std::uint32_t b = 0;
-    [[nodiscard]] bool is_gone() const { return a == b; }
-    void leave() { a = b; }
-  };
+  using Corner = FanCorner<std::uint32_t>;
   /// A collapse of `from` into `to`, in its state when it was priced.
   struct Candidate {
     float price = 0;
@@ -193,8 +185,12 @@ class MeshCollapser {
     [[nodiscard]] bool stays(std::size_t slot) const { return parents[slot] == slot; }
   };
 
+  /// Calls back with each triangle at a place, by its corner there, and the two places that follow
+  /// it.
   template <class Callback>
-  void around(std::uint32_t place, const Callback& callback);
+  void around(std::uint32_t place, const Callback& callback) {
+    visit_fan(places_[place].first, corners_, looks_left_, callback);
+  }
   void link_faces();
   [[nodiscard]] std::array<glm::dvec3, 3> corners_of(const CollapseFace& face) const;
   [[nodiscard]] bool is_wide(std::uint32_t a, std::uint32_t b) const {

@@ -53,6 +53,16 @@ struct Quadric {
             n.x * normal.y, n.x * normal.z, n.y * normal.z,
             n * d,          area * d * d,   area};
   }
+  /// Of a plane through a border's edge from p to q, across its only triangle, whose third corner
+  /// is r; zero where it has no area.
+  static Quadric of_border(const glm::dvec3& p, const glm::dvec3& q, const glm::dvec3& r,
+                           double weight) {
+    const glm::dvec3 edge = q - p;
+    const glm::dvec3 across = glm::cross(glm::cross(edge, r - p), edge);
+    const double length = glm::length(across);
+    if (!(length > 0)) return {};
+    return of_plane(across / length, p, weight * kRimWeight * glm::dot(edge, edge));
+  }
   void operator+=(const Quadric& q) {
     xx += q.xx, yy += q.yy, zz += q.zz, xy += q.xy, xz += q.xz, yz += q.yz;
     b += q.b;

@@ -266,8 +266,8 @@ void report_collapsed(const std::string& name, std::size_t count, PositionKind k
   if (count == 0) return;
   report.diagnostics.push_back(
       {"model.collapsed", DiagnosticSeverity::kInfo, name, 0,
-       std::to_string(count) + " triangles are smaller than the resolution of stored "
-                               "positions and are left out",
+       std::to_string(count) +
+           " triangles are smaller than the resolution of stored positions and are left out",
        kind == PositionKind::kHalf ? "--positions int16 or --max-error keeps more of them"
                                    : "--max-error keeps more of them"});
 }

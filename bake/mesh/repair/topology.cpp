@@ -78,9 +78,9 @@ void add_diagnostics(const TriMesh& mesh, const MeshTopology& topology, Report& 
     report.diagnostics.push_back({id, DiagnosticSeverity::kInfo, mesh.name, 0, message, cure});
   };
   add(topology.non_manifold_edges + topology.non_manifold_vertices, "model.non-manifold",
-      std::to_string(topology.non_manifold_edges) + " edges have more than two triangles and " +
-          std::to_string(topology.non_manifold_vertices) +
-          " vertices are where surfaces meet or touch",
+      with_numbers(
+          "{} edges have more than two triangles and {} vertices are where surfaces meet or touch",
+          {topology.non_manifold_edges, topology.non_manifold_vertices}),
       "they are kept unchanged; levels of detail leave them in place");
   add(topology.duplicate_triangles, "model.duplicate-faces",
       std::to_string(topology.duplicate_triangles) + " triangles repeat an earlier one",

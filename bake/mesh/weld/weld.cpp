@@ -461,8 +461,7 @@ constexpr double kFatalLoss = 0.5;
 Result<void> account_for_faces(const std::string& name, std::uint64_t lost, std::uint64_t all,
                                Report& report) {
   const double share = all == 0 ? 0 : static_cast<double>(lost) / static_cast<double>(all);
-  const std::string what =
-      std::to_string(lost) + " of " + std::to_string(all) + " faces could not be used";
+  const std::string what = with_numbers("{} of {} faces could not be used", {lost, all});
   const char* const cure = "export the model again; the notes above name their faults";
   if (share > kFatalLoss) {
     return fail(ExitCode::kInvalidInput, "model.mostly-lost", name, what, cure);
