@@ -310,6 +310,12 @@ jintArray java_words(JNIEnv* env, const std::vector<jint>& words) {
   return array;
 }
 
+void add_event(JNIEnv* env, jlong number, int kind, jint node) {
+  const Use session(env, number, &Session::drawing);
+  if (!session) return;
+  session->events.push_back({sizeof(modar_event), kind, static_cast<std::uint32_t>(node), 0, 0});
+}
+
 /// Runs the bundle's actions; answers how many commands they give.
 std::size_t act(Session& session, double time_s, const float* poses) {
   std::uint32_t first = 0;
@@ -326,13 +332,15 @@ std::size_t act(Session& session, double time_s, const float* poses) {
   return commands;
 }
 
-/// A text by strlcpy's contract, or null. copy(text, size): answers its length.
+/// A text of the bundle by strlcpy's contract, or null. copy(bundle, text, size): answers its
+/// length.
 template <class Copy>
-jstring text_or_null(JNIEnv* env, const Copy& copy) {
-  const std::size_t size = copy(nullptr, std::size_t{0});
+jstring text_or_null(JNIEnv* env, jlong number, const Copy& copy) {
+  const Use session(env, number, &Session::tracking);
+  const std::size_t size = session ? copy(session->bundle, nullptr, std::size_t{0}) : 0;
   if (size == 0) return nullptr;
   std::string text(size + 1, '\0');
-  copy(text.data(), text.size());
+  copy(session->bundle, text.data(), text.size());
   return java_text(env, text.c_str());
 }
 
@@ -493,25 +501,18 @@ MODAR_NATIVE(jstring, modelName)(JNIEnv* env, jclass, jlong number, jint index) 
 }
 
 MODAR_NATIVE(jstring, language)(JNIEnv* env, jclass, jlong number, jint index) {
-  const Use session(env, number, &Session::tracking);
-  std::array<char, 64> tag{};
-  if (!session || index < 0 ||
-      modar_language(session->bundle, static_cast<std::uint32_t>(index), tag.data(), tag.size()) ==
-          0) {
-    return nullptr;
-  }
-  return java_text(env, tag.data());
+  return text_or_null(env, number, [&](const auto* bundle, char* text, std::size_t size) {
+    return modar_language(bundle, static_cast<std::uint32_t>(index), text, size);
+  });
 }
 
 MODAR_NATIVE(jstring, patternText)
 (JNIEnv* env, jclass, jlong number, jint pattern, jboolean alternative, jstring language) {
   const std::string tag = text_of(env, language);
-  const Use session(env, number, &Session::tracking);
-  if (!session || pattern < 0) return nullptr;
-  const auto index = static_cast<std::uint32_t>(pattern);
   const int kind = alternative != 0 ? MODAR_ALT_TEXT : MODAR_TEXT;
-  return text_or_null(env, [&](char* text, std::size_t size) {
-    return modar_pattern_text(session->bundle, index, kind, tag.c_str(), text, size);
+  return text_or_null(env, number, [&](const auto* bundle, char* text, std::size_t size) {
+    const auto index = static_cast<std::uint32_t>(pattern);
+    return modar_pattern_text(bundle, index, kind, tag.c_str(), text, size);
   });
 }
 
@@ -842,10 +843,7 @@ MODAR_NATIVE(jint, pick)(JNIEnv* env, jclass, jlong number, jfloat x, jfloat y) 
 }
 
 MODAR_NATIVE(void, tapNode)(JNIEnv* env, jclass, jlong number, jint node) {
-  const Use session(env, number, &Session::drawing);
-  if (!session) return;
-  session->events.push_back(
-      {sizeof(modar_event), MODAR_TAP, static_cast<std::uint32_t>(node), 0, 0});
+  add_event(env, number, MODAR_TAP, node);
 }
 
 MODAR_NATIVE(jboolean, label)
@@ -869,10 +867,8 @@ MODAR_NATIVE(jboolean, label)
 }
 
 MODAR_NATIVE(jstring, mark)(JNIEnv* env, jclass, jlong number, jint index) {
-  const Use session(env, number, &Session::tracking);
-  if (!session) return nullptr;
-  return text_or_null(env, [&](char* text, std::size_t size) {
-    return modar_node_mark(session->bundle, static_cast<std::uint32_t>(index), text, size);
+  return text_or_null(env, number, [&](const auto* bundle, char* text, std::size_t size) {
+    return modar_node_mark(bundle, static_cast<std::uint32_t>(index), text, size);
   });
 }
 
@@ -897,10 +893,7 @@ MODAR_NATIVE(jintArray, act)
 }
 
 MODAR_NATIVE(void, ended)(JNIEnv* env, jclass, jlong number, jint node) {
-  const Use session(env, number, &Session::drawing);
-  if (!session) return;
-  session->events.push_back(
-      {sizeof(modar_event), MODAR_ENDED, static_cast<std::uint32_t>(node), 0, 0});
+  add_event(env, number, MODAR_ENDED, node);
 }
 
 MODAR_NATIVE(void, resetActions)(JNIEnv* env, jclass, jlong number) {
@@ -938,10 +931,8 @@ MODAR_NATIVE(jobject, media)(JNIEnv* env, jclass, jlong number, jint index) {
 MODAR_NATIVE(jstring, nodeText)
 (JNIEnv* env, jclass, jlong number, jint index, jboolean title, jstring language) {
   const std::string tag = text_of(env, language);
-  const Use session(env, number, &Session::tracking);
-  if (!session) return nullptr;
-  return text_or_null(env, [&](char* text, std::size_t size) {
-    return modar_node_text(session->bundle, static_cast<std::uint32_t>(index),
+  return text_or_null(env, number, [&](const auto* bundle, char* text, std::size_t size) {
+    return modar_node_text(bundle, static_cast<std::uint32_t>(index),
                            title != 0 ? MODAR_TITLE : MODAR_TEXT, tag.c_str(), text, size);
   });
 }
@@ -949,19 +940,15 @@ MODAR_NATIVE(jstring, nodeText)
 MODAR_NATIVE(jstring, caption)
 (JNIEnv* env, jclass, jlong number, jint index, jstring language, jdouble seconds) {
   const std::string tag = text_of(env, language);
-  const Use session(env, number, &Session::tracking);
-  if (!session) return nullptr;
-  return text_or_null(env, [&](char* text, std::size_t size) {
-    return modar_node_caption(session->bundle, static_cast<std::uint32_t>(index), tag.c_str(),
-                              seconds, text, size);
+  return text_or_null(env, number, [&](const auto* bundle, char* text, std::size_t size) {
+    return modar_node_caption(bundle, static_cast<std::uint32_t>(index), tag.c_str(), seconds, text,
+                              size);
   });
 }
 
 MODAR_NATIVE(jstring, address)(JNIEnv* env, jclass, jlong number, jint action) {
-  const Use session(env, number, &Session::tracking);
-  if (!session) return nullptr;
-  return text_or_null(env, [&](char* text, std::size_t size) {
-    return modar_action_address(session->bundle, static_cast<std::uint32_t>(action), text, size);
+  return text_or_null(env, number, [&](const auto* bundle, char* text, std::size_t size) {
+    return modar_action_address(bundle, static_cast<std::uint32_t>(action), text, size);
   });
 }
 

@@ -209,9 +209,7 @@ final class Bundles {
     double focal() {
         try {
             return Double.parseDouble(text(new FileInputStream(focal)));
-        } catch (IOException none) {
-            return 0;
-        } catch (NumberFormatException torn) {
+        } catch (IOException | NumberFormatException none) {
             return 0;
         }
     }

@@ -260,10 +260,8 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
             if (focal == 0) return;
             stage.focal = focal;
             bundles.setFocal(focal);
-        } catch (ModarException gone) {
+        } catch (ModarException | IOException gone) {
             diagnostics.error(gone.getMessage());
-        } catch (IOException full) {
-            diagnostics.error(full.getMessage());
         }
     }
 
@@ -802,9 +800,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
             showMenu(false);
         } catch (IOException unreadable) {
             notice(words.get("space", unreadable.getMessage()));
-        } catch (ModarException other) {
-            notice(words.get("bundle", other.getMessage()));
-        } catch (RuntimeException refused) { // other apps throw what they like
+        } catch (ModarException | RuntimeException refused) { // other apps throw what they like
             notice(words.get("bundle", refused.getMessage()));
         }
     }
@@ -828,9 +824,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         if (request != CHOSEN_PICTURE) return;
         try {
             edit(own.read(answer.getData()));
-        } catch (IOException unreadable) {
-            notice(words.get("own-unreadable", unreadable.getMessage()));
-        } catch (RuntimeException refused) { // other apps throw what they like
+        } catch (IOException | RuntimeException refused) { // other apps throw what they like
             notice(words.get("own-unreadable", refused.getMessage()));
         }
     }
@@ -1077,10 +1071,7 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         try {
             photos.save(what);
             main.obtainMessage(SAVED, what instanceof File ? "saved-video" : "saved").sendToTarget();
-        } catch (IOException failed) {
-            diagnostics.error(failed.getMessage());
-            say(NOTICE, words.get("space", failed.getMessage()));
-        } catch (RuntimeException refused) { // galleries throw what they like: no card, a profile without storage
+        } catch (IOException | RuntimeException refused) { // galleries throw what they like: no card, no storage
             diagnostics.error(refused.getMessage());
             say(NOTICE, words.get("space", refused.getMessage()));
         }

@@ -134,9 +134,7 @@ final class Media implements MediaPlayer.OnPreparedListener, MediaPlayer.OnCompl
         try {
             give(node, null, reader);
             return reader;
-        } catch (IOException full) {
-            reader.release();
-        } catch (ModarException closed) {
+        } catch (IOException | ModarException closed) {
             reader.release();
         }
         return null;

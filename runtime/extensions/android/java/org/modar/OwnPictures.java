@@ -76,9 +76,7 @@ final class OwnPictures {
                 byte[] record = Bundles.bytes(new FileInputStream(new File(folder, name)));
                 Native.addPattern(session, record, Integer.parseInt(name.substring(name.indexOf('-') + 1)));
                 count++;
-            } catch (IOException torn) {
-                continue;
-            } catch (ModarException ofAnother) { // a bundle with fewer scenes, or a version of long ago
+            } catch (IOException | ModarException torn) { // or of a bundle with fewer scenes, or an old version
                 continue;
             }
         }
