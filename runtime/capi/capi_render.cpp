@@ -22,9 +22,9 @@ struct modar_renderer {
   std::string device;
   std::uint64_t gpu_bytes = 0;
   std::unique_ptr<modar::Renderer> renderer;
-  std::vector<modar::DrawItem> items;
+  std::vector<modar::DrawItem> items = {};
   std::size_t picture_bytes = 0;
-  std::vector<std::uint8_t> chroma;  ///< of a frame whose chroma no format of the renderer has
+  std::vector<std::uint8_t> chroma = {};  ///< of a frame whose chroma no format of the renderer has
 };
 
 namespace {
@@ -32,8 +32,7 @@ namespace {
 modar::Result<modar::GlCaps> caps_for(const std::string& device, std::uint64_t gpu_bytes) {
   modar::GlCaps caps = modar::probe_gl_caps();
   if (!device.empty()) {
-    MODAR_ASSIGN(auto masked, modar::mask_gl_caps(caps, device));
-    caps = masked;
+    MODAR_ASSIGN(caps, modar::mask_gl_caps(caps, device));
   }
   if (gpu_bytes > 0) caps.gpu_memory = gpu_bytes;
   return caps;
@@ -171,17 +170,12 @@ void modar_context_destroy(modar_context* context) {
 modar_renderer* modar_renderer_create(const modar_bundle* bundle, const char* device,
                                       uint64_t gpu_bytes, modar_error* error) {
   if (bundle == nullptr) return modar::fail_null(modar::missing("bundle"), error);
-  auto made = std::make_unique<modar_renderer>();
-  made->bundle = bundle;
-  made->view = bundle->view;
-  made->device = device == nullptr ? "" : device;
-  made->gpu_bytes = gpu_bytes;
-  const auto caps = caps_for(made->device, gpu_bytes);
+  const std::string masked = device == nullptr ? "" : device;
+  const auto caps = caps_for(masked, gpu_bytes);
   if (!caps) return modar::fail_null(caps.error(), error);
   auto renderer = bundle->file.settle(modar::Renderer::create(bundle->view, *caps));
   if (!renderer) return modar::fail_null(renderer.error(), error);
-  made->renderer = std::move(*renderer);
-  return made.release();
+  return new modar_renderer{bundle, bundle->view, masked, gpu_bytes, std::move(*renderer)};
 }
 
 modar_renderer* modar_renderer_create_part(const modar_bundle* bundle, int part, uint64_t gpu_bytes,
@@ -192,11 +186,7 @@ modar_renderer* modar_renderer_create_part(const modar_bundle* bundle, int part,
   auto renderer =
       modar::Renderer::create_part(bundle->view, caps, static_cast<modar::Renderer::Part>(part));
   if (!renderer) return modar::fail_null(renderer.error(), error);
-  auto made = std::make_unique<modar_renderer>();
-  made->bundle = bundle;
-  made->view = bundle->view;
-  made->renderer = std::move(*renderer);
-  return made.release();
+  return new modar_renderer{bundle, bundle->view, "", 0, std::move(*renderer)};
 }
 
 uint32_t modar_renderer_open_wanted(modar_renderer* renderer, uint64_t* offset,
