@@ -90,6 +90,20 @@ std::optional<Json> Json::find(std::string_view path) const {
   return member;
 }
 
+std::vector<Json> Json::elements() const {
+  std::vector<Json> all;
+  for (std::size_t i = 0; is_array() && i < size(); ++i) all.push_back((*this)[i]);
+  return all;
+}
+
+std::string Json::text_at(std::string_view path) const {
+  return (*this)[path].text().value_or("");
+}
+
+double Json::number_at(std::string_view path) const {
+  return (*this)[path].number().value_or(0);
+}
+
 std::optional<double> Json::number() const {
   return value_->json.is_number() ? std::optional(value_->json.get<double>()) : std::nullopt;
 }

@@ -2,10 +2,12 @@
 // nlohmann/json is known to json.cpp alone: a file that includes it takes seconds to compile.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -64,6 +66,14 @@ class Json {
   [[nodiscard]] std::optional<Json> at(std::size_t index) const;
   /// A member of an object; "a/b" is b of a. Nothing: it is absent.
   [[nodiscard]] std::optional<Json> find(std::string_view path) const;
+  /// The same two, null where it is absent.
+  Json operator[](std::size_t index) const { return at(index).value_or(nullptr); }
+  Json operator[](std::string_view path) const { return find(path).value_or(nullptr); }
+  /// Of an array; empty for anything else.
+  [[nodiscard]] std::vector<Json> elements() const;
+  /// A member's text or number; "" and 0 where it is absent or of another type.
+  [[nodiscard]] std::string text_at(std::string_view path) const;
+  [[nodiscard]] double number_at(std::string_view path) const;
   /// Nothing where this is of another type; a count is a number without sign or fraction.
   [[nodiscard]] std::optional<double> number() const;
   [[nodiscard]] std::optional<std::uint64_t> count() const;
@@ -76,6 +86,9 @@ class Json {
   [[nodiscard]] std::string dump() const;
   /// null where the text is no JSON.
   static Json parse(std::string_view text);
+  static Json parse(std::span<const std::byte> text) {
+    return parse(std::string_view(reinterpret_cast<const char*>(text.data()), text.size()));
+  }
 
  private:
   struct Value;

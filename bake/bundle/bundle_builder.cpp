@@ -292,16 +292,15 @@ Result<WeldedModel> read_and_weld(const ModelRequest& model, const BakeRequest& 
                                   TextureUses& textures, Report& report, BakeTrace& trace) {
   StageTimer reading(report, "read");
   ModelMovement movement;
-  Result<SourceModel> source = read_moving(model, request, movement);
-  if (!source) return tl::unexpected(source.error());
-  report.diagnostics.insert(report.diagnostics.end(), source->diagnostics.begin(),
-                            source->diagnostics.end());
-  note_files(*source, trace.files);
-  reading.done(source->positions.size(), source->face_count());
+  MODAR_ASSIGN(SourceModel source, read_moving(model, request, movement));
+  report.diagnostics.insert(report.diagnostics.end(), source.diagnostics.begin(),
+                            source.diagnostics.end());
+  note_files(source, trace.files);
+  reading.done(source.positions.size(), source.face_count());
   if (request.repairs()) {
-    report.repairs.push_back(repair_model(*source, request.repair_support, report));
+    report.repairs.push_back(repair_model(source, request.repair_support, report));
   }
-  Result<TriMesh> mesh = weld(std::move(*source), report, {request.jobs, request.crease_degrees()});
+  Result<TriMesh> mesh = weld(std::move(source), report, {request.jobs, request.crease_degrees()});
   if (!mesh) {
     mesh.error().where = model.path;  // it has the model's name only
     return tl::unexpected(mesh.error());
@@ -415,44 +414,41 @@ Result<std::vector<PackedMesh>> pack_proxies(const ChunkedMesh& mesh,
 /// Splits and packs a model as finely as requested. moving: it has clips.
 Result<ShapedModel> shape_model(TriMesh mesh, const std::vector<std::uint32_t>& texture_sides,
                                 const BakeRequest& request, bool moving, Report& report) {
-  const Result<double> max_error = max_error_of(request, mesh);
-  if (!max_error) return tl::unexpected(max_error.error());
-  const Result<PositionPlan> plan = plan_positions(mesh, {request.positions, *max_error});
-  if (!plan) return tl::unexpected(plan.error());
+  MODAR_ASSIGN(const double max_error, max_error_of(request, mesh));
+  MODAR_ASSIGN(const PositionPlan plan, plan_positions(mesh, {request.positions, max_error}));
   ChunkOptions chunk_options;
-  chunk_options.max_side = plan->max_side;
+  chunk_options.max_side = plan.max_side;
   chunk_options.max_vertices = chunk_vertices_for(mesh.positions.size());
-  Result<ChunkedMesh> chunked = chunk(std::move(mesh), chunk_options, report);
-  if (!chunked) return tl::unexpected(chunked.error());
+  MODAR_ASSIGN(ChunkedMesh chunked, chunk(std::move(mesh), chunk_options, report));
   // Occlusion is of one pose.
   if (request.occlusion && !moving) {
-    chunked->mesh.occlusion = measure_occlusion(*chunked, request.jobs, report);
+    chunked.mesh.occlusion = measure_occlusion(chunked, request.jobs, report);
   }
   LevelOptions level_options;
   // Joints bend flat parts of the stored pose, and coarser levels would lack the folds.
-  level_options.levels = chunked->mesh.vertex_bones.empty() ? request.levels : 1;
-  level_options.positions = plan->kind;
+  level_options.levels = chunked.mesh.vertex_bones.empty() ? request.levels : 1;
+  level_options.positions = plan.kind;
   level_options.jobs = request.jobs;
   level_options.texture_sides = texture_sides;
   // Chunks of proxies have several parts.
-  const ProxyPlan proxies = moving ? ProxyPlan() : plan_proxies(*chunked, level_options);
+  const ProxyPlan proxies = moving ? ProxyPlan() : plan_proxies(chunked, level_options);
   if (!proxies.halvings.empty()) level_options.most_halvings = proxies.halvings[0] - 1;
   level_options.start = proxies.start;
-  MODAR_ASSIGN(const std::vector<ProxyStart> starts, make_levels(*chunked, level_options, report));
+  MODAR_ASSIGN(const std::vector<ProxyStart> starts, make_levels(chunked, level_options, report));
   PackOptions pack_options;
   pack_options.unit_metres = request.unit_metres;
-  pack_options.positions = plan->kind;
+  pack_options.positions = plan.kind;
   pack_options.jobs = request.jobs;
   ShapedModel shaped;
-  MODAR_ASSIGN(shaped.proxies, pack_proxies(*chunked, starts, {proxies, plan->kind}, texture_sides,
+  MODAR_ASSIGN(shaped.proxies, pack_proxies(chunked, starts, {proxies, plan.kind}, texture_sides,
                                             pack_options, report));
-  const bool one_chunk = chunked->chunks.size() == 1 && !shaped.proxies.empty();
-  drop_alike_levels(*chunked, one_chunk ? shaped.proxies[0].levels[0].error
-                                        : std::numeric_limits<double>::infinity());
+  const bool one_chunk = chunked.chunks.size() == 1 && !shaped.proxies.empty();
+  drop_alike_levels(chunked, one_chunk ? shaped.proxies[0].levels[0].error
+                                       : std::numeric_limits<double>::infinity());
   // Smaller models are drawn whole, and chunks that share a range are drawn in one call.
-  pack_options.prefixes = triangles_in(*chunked) > kDrawnWhole;
-  MODAR_ASSIGN(shaped.model, pack(*chunked, texture_sides, pack_options, report));
-  tell_positions(shaped.model, *plan, request, report);
+  pack_options.prefixes = triangles_in(chunked) > kDrawnWhole;
+  MODAR_ASSIGN(shaped.model, pack(chunked, texture_sides, pack_options, report));
+  tell_positions(shaped.model, plan, request, report);
   return shaped;
 }
 
@@ -489,15 +485,14 @@ Result<void> add_models(const BakeRequest& request, const std::vector<KnownScene
   TextureUses textures;
   std::vector<WeldedModel> models;
   for (const ModelRequest& model : request.models) {
-    Result<WeldedModel> welded = read_and_weld(model, request, textures, report, trace);
-    if (!welded) return tl::unexpected(welded.error());
+    MODAR_ASSIGN(WeldedModel welded, read_and_weld(model, request, textures, report, trace));
     for (const KnownScene& known : scenes) {
       if (known.model != models.size()) continue;
-      MODAR_TRY(check_extent(known.scene, welded->mesh, report.uprights.back().axis));
+      MODAR_TRY(check_extent(known.scene, welded.mesh, report.uprights.back().axis));
     }
-    const glm::dvec3 box = welded->mesh.source_max - welded->mesh.source_min;
+    const glm::dvec3 box = welded.mesh.source_max - welded.mesh.source_min;
     trace.model_sides.push_back({box.x, box.y, box.z});
-    models.push_back(std::move(*welded));
+    models.push_back(std::move(welded));
   }
   TextureOptions options = request.textures;
   options.jobs = request.jobs;
@@ -508,13 +503,10 @@ Result<void> add_models(const BakeRequest& request, const std::vector<KnownScene
       MODAR_TRY(make_atlases(atlas, model.mesh, model.uses, textures, report));
     }
   }
-  const Result<std::vector<TextureOutcome>> outcomes =
-      bake_textures(textures, options, request.texture_budget, content, report);
-  if (!outcomes) return tl::unexpected(outcomes.error());
+  MODAR_ASSIGN(const std::vector<TextureOutcome> outcomes,
+               bake_textures(textures, options, request.texture_budget, content, report));
   for (WeldedModel& model : models) {
-    if (auto added = add_model(std::move(model), *outcomes, request, content, report); !added) {
-      return tl::unexpected(added.error());
-    }
+    MODAR_TRY(add_model(std::move(model), outcomes, request, content, report));
   }
   return {};
 }
@@ -570,24 +562,24 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
   for (std::string& file : files_of(request.path, request.shape)) {
     trace.files.push_back(std::move(file));
   }
-  Result<PatternFeatures> baked = bake_pattern(request.path, request.width_mm,
-                                               content.parameter_sets, loop, report, request.shape);
-  if (!baked) return tl::unexpected(baked.error());
+  MODAR_ASSIGN(PatternFeatures baked,
+               bake_pattern(request.path, request.width_mm, content.parameter_sets, loop, report,
+                            request.shape));
   if (request.width_mm > 0 && (request.width_mm < kLeastPrint || request.width_mm > kMostPrint)) {
     report.diagnostics.push_back({"pattern.width", DiagnosticSeverity::kWarning, request.path, 0,
                                   "its printed width is " + shortest_text(request.width_mm) + " mm",
                                   "a width is written with its unit, as in 210mm"});
   }
-  PatternRecord record = baked->record;
+  PatternRecord record = baked.record;
   record.name = content.intern(request.name);
-  trace.ranges.push_back(baked->range);
-  add_pattern_section(content, SectionType::kTrackerRecord, std::move(baked->loop_record));
-  MODAR_TRY(add_colours(request, *baked, content));
-  if (!baked->shape.empty()) {
-    add_pattern_section(content, SectionType::kPatternShape, std::move(baked->shape));
+  trace.ranges.push_back(baked.range);
+  add_pattern_section(content, SectionType::kTrackerRecord, std::move(baked.loop_record));
+  MODAR_TRY(add_colours(request, baked, content));
+  if (!baked.shape.empty()) {
+    add_pattern_section(content, SectionType::kPatternShape, std::move(baked.shape));
   }
   content.patterns.push_back(record);
-  content.features.push_back(std::move(baked->features));
+  content.features.push_back(std::move(baked.features));
   return {};
 }
 

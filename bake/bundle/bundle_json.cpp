@@ -46,9 +46,8 @@ Json level_json(const LevelFigures& levels) {
 }
 
 /// What the meta text has under a model's key.
-std::optional<Json> stated(const BundleView& bundle, std::uint32_t model, const char* key) {
-  const std::optional<Json> one = stated_list(bundle, "models").at(model);
-  return one ? one->find(key) : std::nullopt;
+Json stated(const BundleView& bundle, std::uint32_t model, const char* key) {
+  return stated_list(bundle, "models")[model][key];
 }
 
 constexpr const char* kReasonNames[] = {"asked",  "standard", "header",    "georeferenced",
@@ -224,7 +223,7 @@ Json range_json(const ScoreRange& range, double width_mm) {
 }
 
 Json stated_list(const BundleView& bundle, const char* key) {
-  return Json::parse(bundle.meta()).find(key).value_or(Json());
+  return Json::parse(bundle.meta())[key];
 }
 
 std::optional<ScoreRange> stated_range(const BundleView& bundle, std::uint32_t pattern) {
@@ -232,12 +231,11 @@ std::optional<ScoreRange> stated_range(const BundleView& bundle, std::uint32_t p
 }
 
 std::optional<ScoreRange> range_in(const Json& patterns, std::uint32_t pattern) {
-  const std::optional<Json> one = patterns.at(pattern);
-  const Json values = one ? one->find("range").value_or(Json()) : Json();
+  const Json values = patterns[pattern]["range"];
   if (values.size() != 5) return std::nullopt;
   std::array<double, 5> numbers{};
   for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const std::optional<double> number = values.at(i)->number();
+    const std::optional<double> number = values[i].number();
     if (!number || !(*number >= 0 && *number < 1e6)) return std::nullopt;
     numbers[i] = *number;
   }
@@ -340,12 +338,10 @@ std::string bundle_meta(const BakeRequest& request, const Report& report, const 
 }
 
 std::optional<MeshTopology> stated_topology(const BundleView& bundle, std::uint32_t model) {
-  const std::optional<Json> found = stated(bundle, model, "topology");
-  if (!found) return std::nullopt;
+  const Json found = stated(bundle, model, "topology");
   MeshTopology topology;
   for (const auto& figure : kCounts) {
-    const std::optional<Json> value = found->find(figure.key);
-    const std::optional<std::uint64_t> count = value ? value->count() : std::nullopt;
+    const std::optional<std::uint64_t> count = found[figure.key].count();
     if (!count) return std::nullopt;
     topology.*figure.value = *count;
   }
@@ -353,23 +349,21 @@ std::optional<MeshTopology> stated_topology(const BundleView& bundle, std::uint3
 }
 
 std::optional<MeshDefects> stated_repair(const BundleView& bundle, std::uint32_t model) {
-  const std::optional<Json> found = stated(bundle, model, "repair");
-  if (!found) return std::nullopt;
+  const Json found = stated(bundle, model, "repair");
+  if (found.is_null()) return std::nullopt;
   MeshDefects repair;
   for (std::size_t d = 0; d < kDefects; ++d) {
-    const Json one = found->find(kDefectNames[d]).value_or(Json());
-    repair.counts[d].count = one.find("count").value_or(0).count().value_or(0);
-    repair.counts[d].area = one.find("area").value_or(0).number().value_or(0);
+    const Json one = found[kDefectNames[d]];
+    repair.counts[d] = {one["count"].count().value_or(0), one.number_at("area")};
   }
   return repair;
 }
 
 std::optional<LevelFigures> stated_levels(const BundleView& bundle, std::uint32_t model) {
-  const std::optional<Json> found = stated(bundle, model, "levels");
-  const std::optional<Json> error = found ? found->find("position_error_max") : std::nullopt;
-  const std::optional<Json> shift = found ? found->find("uv_shift_max_texels") : std::nullopt;
-  if (!error || !error->number() || !shift || !shift->number()) return std::nullopt;
-  return LevelFigures{*error->number(), *shift->number()};
+  const Json found = stated(bundle, model, "levels");
+  const auto error = found["position_error_max"].number();
+  const auto shift = found["uv_shift_max_texels"].number();
+  return error && shift ? std::optional(LevelFigures{*error, *shift}) : std::nullopt;
 }
 
 std::optional<Upright> stated_upright(const BundleView& bundle, std::uint32_t model) {
@@ -377,11 +371,9 @@ std::optional<Upright> stated_upright(const BundleView& bundle, std::uint32_t mo
 }
 
 std::optional<Upright> upright_in(const Json& models, std::uint32_t model) {
-  const std::optional<Json> one = models.at(model);
-  const std::optional<Json> found = one ? one->find("up") : std::nullopt;
-  if (!found) return std::nullopt;
-  const auto axis = up_axis_of(found->find("axis").value_or("").text().value_or(""));
-  const std::string reason = found->find("reason").value_or("").text().value_or("");
+  const Json found = models[model]["up"];
+  const auto axis = up_axis_of(found.text_at("axis"));
+  const std::string reason = found.text_at("reason");
   const auto* known = std::find(std::begin(kReasonNames), std::end(kReasonNames), reason);
   if (!axis || known == std::end(kReasonNames)) return std::nullopt;
   return Upright{*axis, static_cast<UpReason>(known - std::begin(kReasonNames))};
@@ -425,10 +417,9 @@ std::string level_words(const BundleView& bundle, std::uint32_t index) {
   const Json list = level_list(bundle, index);
   const auto figures = stated_levels(bundle, index);
   if (list.size() < 2 || !figures) return "";
-  const Json last = list.at(list.size() - 1).value_or(Json());
   char text[128];
   std::snprintf(text, sizeof text, "%zu levels of detail, down to %.0f triangles", list.size(),
-                last.find("triangles").value_or(0).number().value_or(0));
+                list[list.size() - 1].number_at("triangles"));
   std::string words = text;
   if (figures->uv_shift_max_texels > 0) {
     std::snprintf(text, sizeof text, ", texture shifted by at most %.1f texels",
@@ -490,14 +481,12 @@ Json diagnostics_json(const std::vector<Diagnostic>& diagnostics) {
 }
 
 std::optional<StatedPlacement> stated_placement(const BundleView& bundle, std::uint32_t scene) {
-  const std::optional<Json> scenes = Json::parse(bundle.meta()).find("scenes");
-  const std::optional<Json> one = scenes ? scenes->at(scene) : std::nullopt;
-  if (!one) return std::nullopt;
-  const auto up = up_axis_of(one->find("up").value_or("").text().value_or(""));
-  const Json turn = one->find("turn").value_or(Json());
+  const Json one = stated_list(bundle, "scenes")[scene];
+  const auto up = up_axis_of(one.text_at("up"));
+  const Json turn = one["turn"];
   if (!up || turn.size() != 3) return std::nullopt;
   StatedPlacement placement{*up, {}};
-  for (std::size_t i = 0; i < 3; ++i) placement.turn[i] = turn.at(i)->number().value_or(0);
+  for (std::size_t i = 0; i < 3; ++i) placement.turn[i] = turn[i].number().value_or(0);
   return placement;
 }
 

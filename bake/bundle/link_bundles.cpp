@@ -251,8 +251,7 @@ class Linker {
 
   /// What the part's meta text says of its only asset.
   static Json stated_entry(const BundleView& part, const char* kind) {
-    const std::optional<Json> entries = Json::parse(part.meta()).find(kind);
-    return entries ? entries->at(0).value_or(Json()) : Json();
+    return Json::parse(part.meta())[kind][0];
   }
 
   BundleContent content_;

@@ -37,20 +37,14 @@ void check_texts(const BundleView& bundle, const std::vector<SceneText>& sources
     sink(Issue{&workstation_issue_kind(WorkstationRule::kSourceScene), where, offset,
                std::move(detail), std::nullopt});
   };
-  const modar::Json stated =
-      modar::Json::parse(bundle.meta()).find("texts").value_or(modar::Json::array());
+  const std::vector<Json> stated = Json::parse(bundle.meta())["texts"].elements();
   std::size_t known = 0;
   for (const SceneText& source : sources) {
-    modar::Json entry;
-    for (std::size_t i = 0; i < stated.size() && entry.is_null(); ++i) {
-      const modar::Json each = stated.at(i).value_or(modar::Json());
-      const auto named = [&each](const char* key) {
-        const auto value = each.find(key);
-        return value ? value->text().value_or("") : "";
-      };
-      if (named("pattern") == source.pattern && named("model") == source.model) entry = each;
-    }
-    known += entry.is_null() ? 0u : 1u;
+    const auto found = std::find_if(stated.begin(), stated.end(), [&](const Json& each) {
+      return each.text_at("pattern") == source.pattern && each.text_at("model") == source.model;
+    });
+    const Json entry = found == stated.end() ? Json() : *found;
+    known += found == stated.end() ? 0u : 1u;
     for (const std::string& fault : {word_fault(entry.find("text"), source.words),
                                      word_fault(entry.find("alt"), source.alts)}) {
       if (fault.empty()) continue;
@@ -58,8 +52,7 @@ void check_texts(const BundleView& bundle, const std::vector<SceneText>& sources
     }
   }
   if (stated.size() != known) {
-    tell("texts", "it has " + std::to_string(stated.size()) + ", the source " +
-                      std::to_string(sources.size()));
+    tell("texts", with_numbers("it has {}, the source {}", {stated.size(), sources.size()}));
   }
 }
 

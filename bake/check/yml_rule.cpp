@@ -23,8 +23,8 @@ std::string difference(std::string_view yml, const FeatureView& twin) {
   const Result<Features> text = features_from_yml(std::string(yml));
   if (!text) return to_line(text.error());
   if (text->keypoints.size() != twin.keypoints.size()) {
-    return std::to_string(text->keypoints.size()) + " keypoints in the text, " +
-           std::to_string(twin.keypoints.size()) + " in the twin";
+    return with_numbers("{} keypoints in the text, {} in the twin",
+                        {text->keypoints.size(), twin.keypoints.size()});
   }
   const bool same_keypoints =
       twin.keypoints.empty() ||

@@ -56,7 +56,7 @@ void print_textures(const BundleView& bundle) {
               "PSNR dB", "SSIM", "alpha");
   for (std::uint32_t t = 0; t < bundle.textures().size(); ++t) {
     const TextureRecord& texture = bundle.textures()[t];
-    const std::string size = std::to_string(texture.width) + "x" + std::to_string(texture.height);
+    const std::string size = with_numbers("{}x{}", {texture.width, texture.height});
     std::printf("%-24s %11s %7u %10s %8.2f %7.4f %6s\n",
                 std::string(bundle.name(texture.name)).c_str(), size.c_str(), texture.level_count,
                 human_bytes(bundle.texture_data(t).size()).c_str(),
@@ -74,7 +74,7 @@ void print_patterns(const BundleView& bundle) {
   std::printf("\n");
   for (std::uint32_t p = 0; p < bundle.patterns().size(); ++p) {
     const PatternRecord& pattern = bundle.patterns()[p];
-    const std::string size = std::to_string(pattern.width) + "x" + std::to_string(pattern.height);
+    const std::string size = with_numbers("{}x{}", {pattern.width, pattern.height});
     char width[32] = "-";
     if (pattern.width_mm > 0) std::snprintf(width, sizeof width, "%.4g mm", pattern.width_mm);
     std::printf("%-18s %11s %9s", std::string(bundle.name(pattern.name)).c_str(), size.c_str(),

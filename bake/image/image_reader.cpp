@@ -180,9 +180,9 @@ Result<void> check_image_size(std::uint64_t width, std::uint64_t height, std::si
   if (width > kMaxImageSide || height > kMaxImageSide || width * height > most) {
     return fail(
         ExitCode::kInvalidInput, "image.too-large", name,
-        "its header states " + std::to_string(width) + "x" + std::to_string(height) + " pixels",
-        "scale it to at most " + std::to_string(kMaxImageSide) + " pixels a side and " +
-            std::to_string(kMaxImagePixels) + " in all, such as 8192x8192");
+        with_numbers("its header states {}x{} pixels", {width, height}),
+        with_numbers("scale it to at most {} pixels a side and {} in all, such as 8192x8192",
+                     {kMaxImageSide, kMaxImagePixels}));
   }
   if (width == 0 || height == 0) return damaged_image(name, "its header states no size");
   return {};

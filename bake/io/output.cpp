@@ -207,8 +207,8 @@ std::uint64_t file_bytes(const std::vector<std::string>& paths) {
 }
 
 Result<std::vector<std::byte>> trim_to_publish(const BundleView& bundle) {
-  const Json options = Json::parse(bundle.meta()).find("options").value_or(Json());
-  const bool named = options.find("parameters").value_or(Json()).size() != 0;
+  const Json options = Json::parse(bundle.meta())["options"];
+  const bool named = options["parameters"].size() != 0;
   if (named || bundle.parameter_sets().size() == 0) return std::vector<std::byte>();
   const BundleContent content = trim(bundle);
   if (content.parameter_sets.size() != 0) return std::vector<std::byte>();

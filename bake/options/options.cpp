@@ -22,12 +22,8 @@ constexpr const char* kPositions[] = {"half", "int16"};
 constexpr const char* kAtlases[] = {"never", "always"};
 constexpr const char* kMaxErrorUnits[] = {"any", "source", "percent", "metres"};
 
-std::string text_at(const Json& options, const char* key) {
-  return options.find(key).value_or(Json()).text().value_or("");
-}
-
 void restore_number(const Json& options, const char* key, double& value) {
-  value = options.find(key).value_or(Json()).number().value_or(value);
+  value = options[key].number().value_or(value);
 }
 
 constexpr TextOption kDevice = {
@@ -41,7 +37,7 @@ constexpr TextOption kDevice = {
       options.set(name, request.device);
     },
     [](const Json& options, const char* name, BakeRequest& request) {
-      static_cast<void>(plan_for_device(text_at(options, name), request));
+      static_cast<void>(plan_for_device(options.text_at(name), request));
     }};
 
 constexpr TextOption kTier = {tier_names, plan_for_tier,
@@ -49,7 +45,7 @@ constexpr TextOption kTier = {tier_names, plan_for_tier,
                                 options.set(name, request.tier);
                               },
                               [](const Json& options, const char* name, BakeRequest& request) {
-                                static_cast<void>(plan_for_tier(text_at(options, name), request));
+                                static_cast<void>(plan_for_tier(options.text_at(name), request));
                               }};
 
 constexpr TextOption kMaxError = {
@@ -65,7 +61,7 @@ constexpr TextOption kMaxError = {
     },
     [](const Json& options, const char* name, BakeRequest& request) {
       restore_number(options, name, request.max_error.value);
-      const std::string unit = text_at(options, (std::string(name) + "-unit").c_str());
+      const std::string unit = options.text_at(std::string(name) + "-unit");
       const auto* found = std::find(std::begin(kMaxErrorUnits), std::end(kMaxErrorUnits), unit);
       if (found == std::end(kMaxErrorUnits)) return;
       request.max_error.unit = static_cast<MaxError::Unit>(found - std::begin(kMaxErrorUnits));
@@ -94,7 +90,7 @@ constexpr TextOption kUp = {
       options.set(name, request.up ? up_axis_name(*request.up) : "");
     },
     [](const Json& options, const char* name, BakeRequest& request) {
-      request.up = up_axis_of(text_at(options, name));
+      request.up = up_axis_of(options.text_at(name));
     }};
 
 /// The meta text has the picture's name; its path is that of a source of this name.
@@ -107,7 +103,7 @@ constexpr TextOption kLight = {nullptr,
                                  options.set(name, file_name(request.light));
                                },
                                [](const Json& options, const char* name, BakeRequest& request) {
-                                 request.light = source_picture(request, text_at(options, name));
+                                 request.light = source_picture(request, options.text_at(name));
                                }};
 
 constexpr WordsOption kParameters = {
@@ -257,8 +253,8 @@ Result<void> take_number(const NumberOption& number, const std::string& text,
   double value = 0;
   if (!parse_number(text, value) || value < number.least || value > number.most ||
       value != std::floor(value)) {
-    return bad_value(text, "give a number from " + std::to_string(number.least) + " to " +
-                               std::to_string(number.most));
+    return bad_value(text,
+                     with_numbers("give a number from {} to {}", {number.least, number.most}));
   }
   number.at(request) = static_cast<std::uint32_t>(value);
   return {};
@@ -303,8 +299,8 @@ void restore_words(const WordsOption& words, const Json& stated, BakeRequest& re
   if (!stated.is_array()) return;
   const std::vector<std::string> known = words.choices();
   words.at(request).clear();
-  for (std::size_t i = 0; i < stated.size(); ++i) {
-    const std::string word = stated.at(i)->text().value_or("");
+  for (const Json& one : stated.elements()) {
+    const std::string word = one.text().value_or("");
     if (std::find(known.begin(), known.end(), word) == known.end()) continue;
     words.at(request).push_back(word);
   }
@@ -348,8 +344,8 @@ Json option_default(const BakeOption& option) {
 std::string option_help(const BakeOption& option) {
   std::string rules = listed(option_choices(option), " or ");
   if (const auto* number = std::get_if<NumberOption>(&option.value)) {
-    rules = std::to_string(number->least) + " to " + std::to_string(number->most) + "; default " +
-            std::to_string(option_default(option).count().value_or(0));
+    rules = with_numbers("{} to {}; default {}",
+                         {number->least, number->most, option_default(option).count().value_or(0)});
   }
   if (std::holds_alternative<WordOption>(option.value)) {
     const auto usual = option_default(option).text();
@@ -421,7 +417,7 @@ Json state_options(const BakeRequest& request) {
 
 void restore_options(const Json& options, BakeRequest& request) {
   for (const BakeOption& option : kOptions) {
-    const Json stated = options.find(option.name).value_or(Json());
+    const Json stated = options[option.name];
     std::visit(Each{[&](const TruthOption& truth) {
                       truth.at(request) = stated.truth().value_or(truth.at(request));
                     },

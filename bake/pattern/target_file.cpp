@@ -22,22 +22,20 @@ tl::unexpected<Error> no_target(const std::string& path, const std::string& caus
 
 Result<Json> read_target(const std::string& path) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
-  Json json =
-      Json::parse({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()});
-  const auto type = json.find("type");
-  if (!type || !type->text()) return no_target(path, "it is not an image target of 8th Wall");
+  Json json = Json::parse(file.bytes());
+  const auto type = json["type"].text();
+  if (!type) return no_target(path, "it is not an image target of 8th Wall");
   for (const char* known : {"PLANAR", "CYLINDER", "CONICAL"}) {
-    if (*type->text() == known) return json;
+    if (*type == known) return json;
   }
   return fail(ExitCode::kUnsupported, "target.type", path,
-              "its picture is on an unknown kind of object (" + *type->text() + ")",
+              "its picture is on an unknown kind of object (" + *type + ")",
               "PLANAR, CYLINDER and CONICAL are supported: choose another target");
 }
 
 /// A member of the target's geometry, which newer files call properties.
-std::optional<Json> member(const Json& json, const std::string& key) {
-  const auto newer = json.find("properties/" + key);
-  return newer ? newer : json.find("xrMetadata/" + key);
+Json member(const Json& json, const std::string& key) {
+  return json.find("properties/" + key).value_or(json["xrMetadata/" + key]);
 }
 
 /// The place of a target's picture, in millimetres.
@@ -59,33 +57,29 @@ Result<CurvedTarget> read_curved(const Json& json, const std::string& path) {
                                    "height",
                                    "originalWidth"};
   for (std::size_t i = 0; i < std::size(kKeys); ++i) {
-    const auto value = member(json, kKeys[i]);
-    if (!value || !value->number()) {
+    const auto number = member(json, kKeys[i]).number();
+    if (!number) {
       return no_target(path, std::string("it is on a curved object but has no ") + kKeys[i]);
     }
-    numbers[i] = *value->number();
+    numbers[i] = *number;
   }
   const auto& [top_around, bottom_around, side, arc, left, top, width, height, whole_width] =
       numbers;
-  const auto whole_height = member(json, "originalHeight");
-  const double whole = whole_height ? whole_height->number().value_or(0) : 0;
+  const double whole = member(json, "originalHeight").number().value_or(0);
   const bool sane = top_around > 0 && bottom_around > 0 && side > 0 && arc > 0 && arc <= 360 &&
                     width > 0 && height > 0 && width <= whole_width && height <= whole;
   if (!sane) return no_target(path, "its geometry is impossible");
   // A target on its side has its crop measured after the turn, by a quarter with the clock.
-  const auto turned = member(json, "isRotated");
-  const bool on_side = turned && turned->dump().starts_with("true");
+  const bool on_side = member(json, "isRotated").truth().value_or(false);
   const double across = on_side ? height / whole : width / whole_width;
   const double down = on_side ? width / whole_width : height / whole;
   const double above = on_side ? (whole_width - left - width) / whole_width : top / whole;
-  const auto unit = member(json, "unit");
-  const double mm = unit && unit->text() == "in" ? 25.4 : 1;
+  const double mm = member(json, "unit").text() == "in" ? 25.4 : 1;
   const auto around_at = [&, top_around = top_around, bottom_around = bottom_around](double share) {
     return mm * (top_around + (bottom_around - top_around) * share);
   };
   CurvedTarget out;
-  const auto type = json.find("type");
-  const bool cone = type && type->text() == "CONICAL";
+  const bool cone = json.text_at("type") == "CONICAL";
   out.shape.kind = cone ? ShapeRequest::Kind::kCone : ShapeRequest::Kind::kCylinder;
   out.shape.top_mm = around_at(above) / std::numbers::pi;
   out.shape.bottom_mm = around_at(above + down) / std::numbers::pi;
@@ -163,8 +157,8 @@ Result<RgbaImage> read_target_colours(const std::string& path) {
   MODAR_ASSIGN(const std::string file, target_picture(path));
   MODAR_ASSIGN(RgbaImage picture, read_image(file));
   MODAR_ASSIGN(const Json json, read_target(path));
-  const auto turned = member(json, "isRotated");
-  return turned && turned->dump().starts_with("true") ? turned_back(picture) : std::move(picture);
+  const bool turned = member(json, "isRotated").truth().value_or(false);
+  return turned ? turned_back(picture) : std::move(picture);
 }
 
 Result<GrayPicture> load_target(const std::string& path) {

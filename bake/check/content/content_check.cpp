@@ -48,7 +48,7 @@ constexpr const char* kStateIt = "the meta text states ";
 
 /// The name that the meta text gives an asset, as records hold names.
 std::string stated_name(const Json& asset) {
-  const std::string file = asset.find("file").value_or("").text().value_or("");
+  const std::string file = asset.text_at("file");
   BundleContent names;
   names.intern(asset.find("name").value_or(file_stem(file)).text().value_or(""));
   return names.names;
@@ -64,7 +64,7 @@ void check_list(ContentLog& log, const char* key, const char* what, const Record
                  std::to_string(records.size()));
   }
   for (std::uint32_t i = 0; i < std::min<std::size_t>(records.size(), stated.size()); ++i) {
-    const std::string name = stated_name(*stated.at(i));
+    const std::string name = stated_name(stated[i]);
     if (name == log.bundle.name(records[i].name)) continue;
     log.tell(WorkstationRule::kMetaDiffers, log.label(what, records[i].name), &records[i],
              kStateIt + ("the name '" + name + "'"));
@@ -76,8 +76,7 @@ void check_patterns(ContentLog& log) {
   const Table<PatternRecord> patterns = log.bundle.patterns();
   for (std::uint32_t p = 0; p < patterns.size(); ++p) {
     const PatternRecord& pattern = patterns[p];
-    const auto one = stated.at(p);
-    const double width = one ? one->find("width_mm").value_or(0).number().value_or(0) : 0;
+    const double width = stated[p].number_at("width_mm");
     const auto range = range_in(stated, p);
     const double score = range ? score_of(*range) : -1;
     std::string fault;
@@ -210,8 +209,7 @@ void check_statements(ContentLog& log) {
 
 bool check_content(const BundleView& bundle, const IssueSink& sink, const ContentOptions& options) {
   const std::string_view meta = bundle.meta();
-  const auto tool = Json::parse(meta).find("tool");
-  const bool ours = tool && tool->text().value_or("").starts_with("modar ");
+  const bool ours = Json::parse(meta).text_at("tool").starts_with("modar ");
   if (!ours || meta.starts_with(kPreviewMeta)) return true;
   ContentLog log(bundle, sink, options);
   for (const auto rules :

@@ -44,27 +44,24 @@ std::array<double, 3> sides_of(const BundleView& bundle, const ModelRecord& mode
 
 std::string place_fault(const BundleView& bundle, const BundleContent& content,
                         const SceneRecord& scene, const Json& stated) {
-  const auto text = [&](const char* key) {
-    return stated.find(key).value_or("").text().value_or("");
-  };
-  if (text("pattern") != bundle.name(bundle.patterns()[scene.pattern].name) ||
-      text("model") != bundle.name(bundle.models()[scene.model].name)) {
+  if (stated.text_at("pattern") != bundle.name(bundle.patterns()[scene.pattern].name) ||
+      stated.text_at("model") != bundle.name(bundle.models()[scene.model].name)) {
     return "another pattern or model";
   }
-  const auto up = up_axis_of(text("up"));
-  const auto scale = stated.find("scale").value_or(Json()).number();
-  const Json turn = stated.find("turn").value_or(Json());
-  const Json offset = stated.find("offset_sides").value_or(Json());
+  const auto up = up_axis_of(stated.text_at("up"));
+  const auto scale = stated["scale"].number();
+  const Json turn = stated["turn"];
+  const Json offset = stated["offset_sides"];
   if (!up || !scale || turn.size() != 3 || offset.size() != 3) return {};
   SceneRequest request;
   request.up = up;
   request.size = {SceneSize::Kind::kScale, *scale};
-  request.centred = stated.find("centred").value_or(false).truth().value_or(false);
+  request.centred = stated["centred"].truth().value_or(false);
   request.offset.unit = SceneOffset::Unit::kSide;
-  request.clip = text("clip");
+  request.clip = stated.text_at("clip");
   for (std::size_t i = 0; i < 3; ++i) {
-    request.turn[i] = turn.at(i)->number().value_or(0);
-    request.offset.value[i] = offset.at(i)->number().value_or(0);
+    request.turn[i] = turn[i].number().value_or(0);
+    request.offset.value[i] = offset[i].number().value_or(0);
   }
   const ModelRecord& model = bundle.models()[scene.model];
   const std::array<double, 3> sides = sides_of(bundle, model);

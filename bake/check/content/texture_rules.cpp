@@ -35,11 +35,10 @@ bool is_of_a_material(const BundleView& bundle, std::uint32_t texture) {
 /// Are its sides those that `modar bake` gives an image of the stated size?
 bool has_its_size(const BundleView& bundle, const TextureRecord& texture) {
   const Json stated = stated_list(bundle, "options");
-  const auto most = stated.find("max-texture").value_or(Json()).count();
+  const auto most = stated["max-texture"].count();
   const std::uint32_t longer = std::max(texture.width, texture.height);
   // A device or a tier may ask for less.
-  const bool free = stated.find("device").value_or("").text() != "" ||
-                    stated.find("tier").value_or("").text() != "" || !most;
+  const bool free = !stated.text_at("device").empty() || !stated.text_at("tier").empty() || !most;
   TextureOptions options;
   options.mipmaps = texture.level_count > 1;
   options.wrap = texture.flags & kTextureRepeat;
@@ -242,8 +241,7 @@ std::string mip_fault(const BundleView& bundle, std::uint32_t texture, std::uint
   for (std::uint32_t y = 0; y < image.height; y += 4) {
     for (std::uint32_t x = 0; x < image.width; x += 4) {
       if (pair.halves(x, y)) continue;
-      return "level " + std::to_string(level) + " at pixel " + std::to_string(x) + "," +
-             std::to_string(y) + " is no half of the level before";
+      return with_numbers("level {} at pixel {},{} is no half of the level before", {level, x, y});
     }
   }
   return "";

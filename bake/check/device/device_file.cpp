@@ -17,39 +17,37 @@ class ProfileReader {
   [[nodiscard]] const std::string& wrong_key() const { return wrong_; }
 
   void text(const char* key, std::string& value) {
-    const std::optional<std::string> found = member(key).text();
+    const std::optional<std::string> found = document_[key].text();
     if (!found || found->empty()) return blame(key);
     value = *found;
   }
 
   template <class T>
   void number(const char* key, T& value) {
-    take(key, member(key), value);
+    take(key, document_[key], value);
   }
 
   /// Two numbers.
   void sides(const char* key, int& width, int& height) {
-    const Json found = member(key);
+    const Json found = document_[key];
     if (!found.is_array() || found.size() != 2) return blame(key);
-    take(key, *found.at(0), width);
-    take(key, *found.at(1), height);
+    take(key, found[0], width);
+    take(key, found[1], height);
   }
 
   /// Names, as the profile has them: one string with a blank before and after each.
   void names(const char* key, std::string& value) {
-    const Json found = member(key);
+    const Json found = document_[key];
     if (!found.is_array()) return blame(key);
     value = " ";
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      const std::optional<std::string> name = found.at(i)->text();
+    for (const Json& one : found.elements()) {
+      const std::optional<std::string> name = one.text();
       if (!name || name->find(' ') != std::string::npos) return blame(key);
       value += *name + " ";
     }
   }
 
  private:
-  [[nodiscard]] Json member(const char* key) const { return document_.find(key).value_or(Json()); }
-
   template <class T>
   void take(const char* key, const Json& from, T& value) {
     const std::optional<std::uint64_t> count = from.count();

@@ -71,8 +71,7 @@ class DeviceCheck {
     }
     if (!reads) {
       tell(WorkstationRule::kDeviceEtc1, where, &texture.format,
-           std::to_string(bytes) + " bytes become " +
-               std::to_string(texture_bytes(bundle_, index, false)));
+           with_numbers("{} bytes become {}", {bytes, texture_bytes(bundle_, index, false)}));
     }
   }
 
@@ -160,19 +159,16 @@ class DeviceCheck {
       const bool drawn = most_coarse_bytes_ <= geometry_share(texture_bytes_, limit) &&
                          most_coarse_bytes_ + smallest_bytes_ <= limit;
       tell(drawn ? WorkstationRule::kDeviceGpuDetail : WorkstationRule::kDeviceGpuMemory,
-           largest_asset(), first,
-           std::to_string(gpu) + " bytes in all, at most " + std::to_string(limit));
+           largest_asset(), first, with_numbers("{} bytes in all, at most {}", {gpu, limit}));
     }
     const std::uint64_t file = bundle_.bytes().size();
     if (file > device_.ram_mib * kMebibyte / 2) {
       tell(WorkstationRule::kDeviceRam, largest_asset(), first,
-           std::to_string(file) + " bytes, the memory has " +
-               std::to_string(device_.ram_mib * kMebibyte));
+           with_numbers("{} bytes, the memory has {}", {file, device_.ram_mib * kMebibyte}));
     }
     if (file > device_.storage_mib * kMebibyte / 2) {
       tell(WorkstationRule::kDeviceStorage, largest_asset(), first,
-           std::to_string(file) + " bytes, the storage has " +
-               std::to_string(device_.storage_mib * kMebibyte));
+           with_numbers("{} bytes, the storage has {}", {file, device_.storage_mib * kMebibyte}));
     }
   }
 

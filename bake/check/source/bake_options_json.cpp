@@ -12,22 +12,6 @@
 namespace modar {
 namespace {
 
-/// A member of that type; what it is without it. The text may be anyone's.
-std::string text_in(const Json& stated, const char* key) {
-  return stated.find(key).value_or(Json()).text().value_or("");
-}
-double number_in(const Json& stated, const char* key, double otherwise) {
-  return stated.find(key).value_or(Json()).number().value_or(otherwise);
-}
-
-/// The objects of an array of the document.
-std::vector<Json> entries_of(const Json& document, const char* kind) {
-  const Json list = document.find(kind).value_or(Json());
-  std::vector<Json> entries;
-  for (std::size_t i = 0; list.is_array() && i < list.size(); ++i) entries.push_back(*list.at(i));
-  return entries;
-}
-
 /// A name of a scene or a pattern that is among the sources: others cannot be baked.
 template <class Range>
 bool is_given(const Range& sources, const std::string& name) {
@@ -35,10 +19,10 @@ bool is_given(const Range& sources, const std::string& name) {
 }
 
 void take_three(const Json& stated, const char* key, std::array<double, 3>& values) {
-  const Json list = stated.find(key).value_or(Json());
+  const Json list = stated[key];
   if (!list.is_array() || list.size() != values.size()) return;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    values[i] = list.at(i)->number().value_or(values[i]);
+    values[i] = list[i].number().value_or(values[i]);
   }
 }
 
@@ -46,9 +30,9 @@ void take_three(const Json& stated, const char* key, std::array<double, 3>& valu
 /// names come first, and only the user distinguishes two files of one name.
 template <class Asset>
 void read_names(const Json& document, const char* kind, std::vector<Asset>& assets) {
-  for (const Json& stated : entries_of(document, kind)) {
-    const std::string file = text_in(stated, "file");
-    const std::string name = text_in(stated, "name");
+  for (const Json& stated : document[kind].elements()) {
+    const std::string file = stated.text_at("file");
+    const std::string name = stated.text_at("name");
     const auto same = [&](const Asset& asset) {
       return asset.name.empty() && file_name(asset.path) == file;
     };
@@ -58,19 +42,19 @@ void read_names(const Json& document, const char* kind, std::vector<Asset>& asse
 }
 
 void read_scenes(const Json& document, BakeRequest& request) {
-  for (const Json& stated : entries_of(document, "scenes")) {
+  for (const Json& stated : document["scenes"].elements()) {
     SceneRequest scene;
-    scene.pattern = text_in(stated, "pattern");
-    scene.model = text_in(stated, "model");
-    scene.size.value = number_in(stated, "scale", scene.size.value);
-    scene.up = up_axis_of(text_in(stated, "up"));
-    scene.centred = stated.find("centred").value_or(Json()).truth().value_or(false);
+    scene.pattern = stated.text_at("pattern");
+    scene.model = stated.text_at("model");
+    scene.size.value = stated["scale"].number().value_or(scene.size.value);
+    scene.up = up_axis_of(stated.text_at("up"));
+    scene.centred = stated["centred"].truth().value_or(false);
     take_three(stated, "turn", scene.turn);
     scene.offset.unit = SceneOffset::Unit::kSide;
     take_three(stated, "offset_sides", scene.offset.value);
-    scene.light = source_picture(request, text_in(stated, "light"));
-    scene.clip = text_in(stated, "clip");
-    scene.once = stated.find("once").value_or(Json()).truth().value_or(false);
+    scene.light = source_picture(request, stated.text_at("light"));
+    scene.clip = stated.text_at("clip");
+    scene.once = stated["once"].truth().value_or(false);
     if (is_given(request.models, scene.model) && is_given(request.patterns, scene.pattern)) {
       request.scenes.push_back(scene);
     }
@@ -79,10 +63,10 @@ void read_scenes(const Json& document, BakeRequest& request) {
 
 /// The widths and shapes that patterns were baked with, where the user gives none.
 void read_widths(const Json& document, BakeRequest& request) {
-  for (const Json& stated : entries_of(document, "patterns")) {
-    const std::string file = text_in(stated, "file");
-    const double width = number_in(stated, "width_mm", 0);
-    const auto shape = parse_shape(text_in(stated, "shape"));
+  for (const Json& stated : document["patterns"].elements()) {
+    const std::string file = stated.text_at("file");
+    const double width = stated.number_at("width_mm");
+    const auto shape = parse_shape(stated.text_at("shape"));
     for (PatternRequest& pattern : request.patterns) {
       if (file_name(pattern.path) != file) continue;
       if (pattern.width_mm == 0 && width > 0) pattern.width_mm = width;
@@ -93,14 +77,14 @@ void read_widths(const Json& document, BakeRequest& request) {
 
 /// Pictures among the sources that give light and are no patterns of the bundle.
 void leave_out_lights(const Json& document, BakeRequest& request) {
-  const std::vector<Json> patterns = entries_of(document, "patterns");
+  const std::vector<Json> patterns = document["patterns"].elements();
   std::erase_if(request.patterns, [&](const PatternRequest& pattern) {
     const bool lights =
         pattern.path == request.light ||
         std::any_of(request.scenes.begin(), request.scenes.end(),
                     [&](const SceneRequest& scene) { return scene.light == pattern.path; });
     return lights && std::none_of(patterns.begin(), patterns.end(), [&](const Json& stated) {
-             return text_in(stated, "file") == file_name(pattern.path);
+             return stated.text_at("file") == file_name(pattern.path);
            });
   });
 }
@@ -114,7 +98,7 @@ void read_bake_options(std::string_view meta, BakeRequest& request) {
   if (!name_assets(request)) return;
   read_scenes(document, request);
   read_widths(document, request);
-  if (const Json options = document.find("options").value_or(Json()); !options.keys().empty()) {
+  if (const Json options = document["options"]; !options.keys().empty()) {
     // Of bundles that were baked before there was any.
     request.occlusion = request.shadows = false;
     request.atlas = AtlasMode::kNever;

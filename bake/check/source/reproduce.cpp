@@ -120,8 +120,9 @@ Result<void> prove_reproducible(const BakeRequest& request, const std::vector<st
   if (a == baked.end() && b == bytes.end()) return {};
   return fail(ExitCode::kInternal, "bake.not-reproducible",
               "byte " + std::to_string(a - baked.begin()),
-              "a second bake under other circumstances gave " + std::to_string(bytes.size()) +
-                  " bytes that differ from the " + std::to_string(baked.size()) + " of the first",
+              with_numbers("a second bake under other circumstances gave {} bytes that differ from "
+                           "the {} of the first",
+                           {bytes.size(), baked.size()}),
               "internal error: please report it with the input");
 }
 

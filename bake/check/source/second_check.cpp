@@ -209,9 +209,9 @@ Result<void> check_second(const BundleView& bundle, std::uint32_t index, const S
   const auto other = static_cast<double>(theirs.mesh.triangles.size());
   // It may have more: translucent triangles are cut for their order.
   if (count + kFewTriangles < (1 - kMaxCount) * other) {
-    tell(WorkstationRule::kSourceCounts, std::to_string(ours.mesh.triangles.size()) +
-                                             " triangles, a second reader's are " +
-                                             std::to_string(theirs.mesh.triangles.size()));
+    tell(WorkstationRule::kSourceCounts,
+         with_numbers("{} triangles, a second reader's are {}",
+                      {ours.mesh.triangles.size(), theirs.mesh.triangles.size()}));
   }
   const Measures a = measures_of(ours.mesh);
   const Measures b = measures_of(theirs.mesh);

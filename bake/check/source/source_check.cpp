@@ -149,7 +149,7 @@ class PartList {
     const std::uint32_t number = proxies_[group.model]++;
     for (std::uint32_t c = 0; c < group.chunk_count; ++c) {
       add_chunk(named("model", model.name, &model), model, group.first_chunk + c,
-                "proxy " + std::to_string(number) + ", chunk " + std::to_string(c));
+                with_numbers("proxy {}, chunk {}", {number, c}));
     }
   }
 
@@ -272,8 +272,7 @@ class SourceCheck {
     MODAR_ASSIGN(const std::vector<std::byte> bytes, encode_bundle(content));
     MODAR_ASSIGN(again_, BundleView::open(bytes));
     const Json meta = Json::parse(bundle_.meta());
-    exact_ = meta.find("tool").value_or(Json()).text() == "modar " + request.tool_version &&
-             !meta.find("baked_apart");
+    exact_ = meta["tool"].text() == "modar " + request.tool_version && !meta.find("baked_apart");
     StageTimer timer(report, "compare");
     ours_ = PartList(bundle_).list();
     theirs_ = PartList(again_).list();

@@ -22,7 +22,7 @@ std::string heads(std::initializer_list<const char*> names) {
 }
 
 std::string text_at(const Json& object, const char* key) {
-  return escape_html(object.find(key).value_or("").text().value_or(""));
+  return escape_html(object.text_at(key));
 }
 
 /// Titles, texts and alternatives, a line a language.
@@ -59,7 +59,7 @@ std::string node_state(const NodeRecord& node) {
 std::string node_table(const BundleView& bundle, const Json& nodes) {
   std::string html = heads({"Name", "What", "On", "State", "Words"});
   for (std::uint32_t n = 0; n < bundle.nodes().size(); ++n) {
-    const Json one = nodes.at(n).value_or(Json());
+    const Json one = nodes[n];
     const std::string mark = text_at(one, "mark");
     html += "<tr><th scope=\"row\">" + text_at(one, "name") +
             (mark.empty() ? "" : " <span class=\"chip\">" + mark + "</span>") + "</th><td>" +
@@ -77,8 +77,7 @@ std::string media_table(const BundleView& bundle) {
     const bool video = media.kind == static_cast<std::uint32_t>(MediaKind::kVideo);
     char seconds[32];
     std::snprintf(seconds, sizeof seconds, "%.1f s", static_cast<double>(media.seconds));
-    const std::string sides =
-        std::to_string(media.width) + " × " + std::to_string(media.height) + " video, ";
+    const std::string sides = with_numbers("{} × {} video, ", {media.width, media.height});
     const char* sound = (media.flags & kMediaSound) != 0 ? "with sound" : "silent";
     const char* flashes = (media.flags & kMediaFlashes) != 0
                               ? "<span class=\"chip warn\">more than three a second</span>"
@@ -93,8 +92,7 @@ std::string media_table(const BundleView& bundle) {
 
 std::string action_table(const Json& actions) {
   std::string html = heads({"On", "When: what"});
-  for (std::size_t a = 0; a < actions.size(); ++a) {
-    const Json one = actions.at(a).value_or(Json());
+  for (const Json& one : actions.elements()) {
     html += "<tr><th scope=\"row\">" + text_at(one, "pattern") + "</th><td>" +
             text_at(one, "words") + "</td></tr>\n";
   }
@@ -109,10 +107,10 @@ std::string acting_section(const BundleView& bundle) {
   std::string html =
       "<section aria-labelledby=\"acting\">\n<h2 id=\"acting\">What plays, points "
       "and acts</h2>\n" +
-      node_table(bundle, document.find("nodes").value_or(Json::array()));
+      node_table(bundle, document["nodes"]);
   if (!bundle.media().empty()) html += "<h3>Videos and sounds</h3>\n" + media_table(bundle);
   if (!bundle.actions().empty()) {
-    html += "<h3>Actions</h3>\n" + action_table(document.find("actions").value_or(Json::array()));
+    html += "<h3>Actions</h3>\n" + action_table(document["actions"]);
   }
   return html + "</section>\n";
 }

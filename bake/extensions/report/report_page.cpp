@@ -384,8 +384,7 @@ class Page {
   Result<void> timings() {
     if (options_.bake_json.empty()) return {};
     const Json json = Json::parse(options_.bake_json);
-    const std::optional<Json> stages = json.find("stages");
-    if (!stages || !stages->is_array()) {
+    if (!json["stages"].is_array()) {
       return fail(ExitCode::kInvalidInput, "report.bake", "--bake",
                   "the file contains no stages of a bake",
                   "pass the output of `modar bake --model ... --json`");
@@ -395,24 +394,16 @@ class Page {
         "<div class=\"scroll\"><table class=\"figures\"><thead><tr><th scope=\"col\">Stage</th><th "
         "scope=\"col\">Seconds</th><th scope=\"col\">In</th><th scope=\"col\">Out</th></tr></thead>"
         "<tbody>\n";
-    const auto number = [](const Json& stage, const char* key) {
-      const std::optional<Json> found = stage.find(key);
-      return found ? found->number().value_or(0) : 0;
-    };
-    for (std::size_t i = 0; i < stages->size(); ++i) {
-      const Json stage = *stages->at(i);
-      const std::optional<Json> label = stage.find("name");
-      html_ += "<tr><th scope=\"row\">" +
-               escape_html(label ? label->text().value_or("") : std::string()) + "</th><td>" +
-               print("%.2f", number(stage, "ms") / 1000) + "</td><td>" +
-               grouped(static_cast<std::uint64_t>(number(stage, "in"))) + "</td><td>" +
-               grouped(static_cast<std::uint64_t>(number(stage, "out"))) + "</td></tr>\n";
+    for (const Json& stage : json["stages"].elements()) {
+      html_ += "<tr><th scope=\"row\">" + escape_html(stage.text_at("name")) + "</th><td>" +
+               print("%.2f", stage.number_at("ms") / 1000) + "</td><td>" +
+               grouped(static_cast<std::uint64_t>(stage.number_at("in"))) + "</td><td>" +
+               grouped(static_cast<std::uint64_t>(stage.number_at("out"))) + "</td></tr>\n";
     }
-    const auto total = json.find("cpu_seconds");
     html_ += "</tbody></table></div>\n<p class=\"note\">" +
-             print("%.1f CPU seconds in all.", total ? total->number().value_or(0) : 0) +
+             print("%.1f CPU seconds in all.", json.number_at("cpu_seconds")) +
              "</p>\n</section>\n";
-    account(json.find("account").value_or(Json::array()));
+    account(json["account"]);
     return {};
   }
 
@@ -424,15 +415,13 @@ class Page {
         "<div class=\"scroll\"><table class=\"figures\"><thead><tr><th scope=\"col\">Model</th><th "
         "scope=\"col\">Of its</th><th scope=\"col\">Used</th><th scope=\"col\">Changed</th><th "
         "scope=\"col\">Left out</th></tr></thead><tbody>\n";
-    for (std::size_t m = 0; m < models.size(); ++m) {
-      const Json model = *models.at(m);
-      const std::string title = model.find("model").value_or("").text().value_or("");
+    for (const Json& model : models.elements()) {
+      const std::string title = model.text_at("model");
       for (const char* kind : {"images", "colours", "faces", "nodes", "animations", "attributes"}) {
         std::string cells;
         double all = 0;
         for (const char* fate : {"used", "changed", "left_out"}) {
-          const auto found = model.find(std::string(kind) + "/" + fate);
-          const double number = found ? found->number().value_or(0) : 0;
+          const double number = model.number_at(std::string(kind) + "/" + fate);
           cells += "<td>" + grouped(static_cast<std::uint64_t>(number)) + "</td>";
           all += number;
         }
@@ -549,10 +538,9 @@ class Page {
       items.push_back({label, kind, bytes});
       rest -= bytes;
     };
-    const std::optional<Json> models = bundle_json(bundle_).find("models");
+    const Json models = bundle_json(bundle_)["models"];
     for (std::uint32_t m = 0; m < bundle_.models().size(); ++m) {
-      add(name(bundle_.models()[m].name), "model",
-          models->at(m)->find("bytes")->number().value_or(0));
+      add(name(bundle_.models()[m].name), "model", models[m].number_at("bytes"));
     }
     for (std::uint32_t t = 0; t < bundle_.textures().size(); ++t) {
       add(name(bundle_.textures()[t].name), "texture",

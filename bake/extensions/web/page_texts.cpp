@@ -35,18 +35,16 @@ std::string models_on(const BundleView& bundle, std::uint32_t pattern) {
 
 Json bundle_texts(std::string_view meta, const std::string& pattern,
                   const std::vector<std::string>& languages) {
-  const Json scenes = Json::parse(meta).find("texts").value_or(Json());
   Json texts;
-  for (std::size_t i = 0; i < scenes.size(); ++i) {
-    const Json scene = scenes.at(i).value_or(Json());
-    if (scene.find("pattern").value_or("").text() != pattern) continue;
+  for (const Json& scene : Json::parse(meta)["texts"].elements()) {
+    if (scene.text_at("pattern") != pattern) continue;
     for (const std::string& language : languages) {
       for (const char* key : {"text", "alt"}) {
-        const auto words = scene.find(std::string(key) + "/" + language);
-        if (!words || !words->text()) continue;
+        const auto words = scene[std::string(key) + "/" + language].text();
+        if (!words) continue;
         Json entry = texts.find(language).value_or(Json{{"text", ""}});
-        const std::string before = entry.find(key).value_or("").text().value_or("");
-        entry.set(key, before.empty() ? *words->text() : before + " " + *words->text());
+        const std::string before = entry.text_at(key);
+        entry.set(key, before.empty() ? *words : before + " " + *words);
         texts.set(language, entry);
       }
     }
@@ -58,14 +56,13 @@ Result<Json> given_texts(const Json& given, const std::string& file, const std::
                          const std::vector<std::string>& languages) {
   Json texts = Json::object();
   for (const std::string& language : languages) {
-    const auto name = given.find(language + "/name");
+    const auto name = given[language + "/name"].text();
     if (!given.find(language)) continue;
-    if (!name || !name->text()) {
+    if (!name) {
       return fail(ExitCode::kInvalidInput, "web.texts", file + ", " + pattern + ", " + language,
                   "there is no name", R"(write {"name": "...", "text": "...", "alt": "..."})");
     }
-    const auto text = given.find(language + "/text");
-    Json entry = {{"name", *name}, {"text", text ? *text : Json("")}};
+    Json entry = {{"name", *name}, {"text", given.find(language + "/text").value_or("")}};
     if (const auto alt = given.find(language + "/alt")) entry.set("alt", *alt);
     texts.set(language, entry);
   }

@@ -164,19 +164,17 @@ Result<void> check_words(const Draft& draft, const std::string& language) {
   MODAR_ASSIGN(const std::string own, words_of(draft, language));
   const Json wanted = Json::parse(english);
   const Json given = Json::parse(own);
-  const auto said = [](const std::optional<Json>& text) {
-    return text && !text->text().value_or("").empty();
-  };
+  const auto said = [](const Json& text) { return !text.text().value_or("").empty(); };
   const auto missing = [&](const std::string& text) {
     return fail(ExitCode::kInvalidInput, "web.words", language + ".json",
                 "it has no text '" + text + "'", "translate each text of words/en.json");
   };
   for (const std::string& key : wanted.keys()) {
-    if (wanted.find(key)->text() && !said(given.find(key))) return missing(key);
+    if (wanted[key].text() && !said(given[key])) return missing(key);
   }
-  for (const std::string& each : wanted.find("errors")->keys()) {
-    const Json pair = given.find("errors/" + each).value_or(Json());  // what happened, what to do
-    if (!said(pair.at(0)) || !said(pair.at(1))) return missing("errors/" + each);
+  for (const std::string& each : wanted["errors"].keys()) {
+    const Json pair = given["errors/" + each];  // what happened, what to do
+    if (!said(pair[0]) || !said(pair[1])) return missing("errors/" + each);
   }
   return {};
 }
@@ -216,8 +214,7 @@ Result<void> choose_languages(Draft& draft) {
 Result<void> read_texts(Draft& draft) {
   if (draft.options.texts.empty()) return {};
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(draft.options.texts));
-  draft.texts =
-      Json::parse({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()});
+  draft.texts = Json::parse(file.bytes());
   if (!draft.texts.is_null() && !draft.texts.is_array()) return {};
   return fail(ExitCode::kInvalidInput, "web.texts", draft.options.texts,
               "this is not a JSON object",
@@ -450,10 +447,9 @@ Result<Json> put_statements(Draft& draft, const Publisher& publisher, const std:
     const std::string written = own ? language : "en";
     MODAR_ASSIGN(const std::string file, page_text(draft, "statements/" + written + ".json"));
     const Json texts = Json::parse(file);
-    const Json names = draft.undescribed.find(language).value_or(Json::array());
     std::vector<std::string> undescribed;
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      undescribed.push_back(names.at(i)->text().value_or(""));
+    for (const Json& one : draft.undescribed[language].elements()) {
+      undescribed.push_back(one.text().value_or(""));
     }
     const std::string name = "accessibility-" + language + ".html";
     MODAR_TRY(put(draft, name, statement_page(texts, written, title, publisher, undescribed)));
@@ -494,7 +490,7 @@ Result<void> add_unloaded(const Draft& draft, std::string& html) {
   for (const std::string& language : draft.languages) {
     if (language == "en" || at == std::string::npos) continue;
     MODAR_ASSIGN(const std::string words, words_of(draft, language));
-    const std::string text = Json::parse(words).find("unloaded").value_or("").text().value_or("");
+    const std::string text = Json::parse(words).text_at("unloaded");
     html.insert(at + kStart.size(),
                 "<a href=\"\" lang=\"" + language + "\">" + escape_html(text) + "</a>");
   }

@@ -19,7 +19,7 @@ constexpr std::string_view kProven[] = {"axe",   "names",     "keys",  "handles"
                                         "alone", "languages", "reflow"};
 
 std::string filled(const Json& texts, std::string_view key, const Values& values) {
-  std::string html = escape_html(texts.find(key).value_or("").text().value_or(""));
+  std::string html = escape_html(texts.text_at(key));
   for (const auto& [name, value] : values) {
     const std::string mark = "{" + std::string(name) + "}";
     for (std::size_t at = html.find(mark); at != std::string::npos;
@@ -53,12 +53,9 @@ std::string paragraph(const std::string& html) {
 
 Result<Publisher> read_publisher(const std::string& path) {
   MODAR_ASSIGN(const MappedFile file, MappedFile::open(path));
-  const Json given =
-      Json::parse({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()});
-  const auto part = [&](const char* key) {
-    return given.find(key).value_or("").text().value_or("");
-  };
-  Publisher publisher{part("publisher"), part("date"), part("feedback"), part("enforcement")};
+  const Json given = Json::parse(file.bytes());
+  Publisher publisher{given.text_at("publisher"), given.text_at("date"), given.text_at("feedback"),
+                      given.text_at("enforcement")};
   const std::pair<const char*, bool> parts[] = {
       {"publisher", !publisher.name.empty()},
       {"date", is_date(publisher.date)},
