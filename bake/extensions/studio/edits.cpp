@@ -21,10 +21,6 @@ tl::unexpected<Error> no_edit(const std::string& cause) {
   return fail(ExitCode::kUsage, "studio.edit", "", cause, "reload the page");
 }
 
-std::string member(const Json& json, const char* key) {
-  return json.find(key).value_or(Json()).text().value_or("");
-}
-
 bool holds_no_asset(const Error& error) {
   return error.code == "project.empty";
 }
@@ -37,16 +33,16 @@ class Edits {
   [[nodiscard]] const std::string& text() const { return text_; }
 
   Result<void> apply(const Json& edit) {
-    const std::string op = member(edit, "op");
-    const std::string table = member(edit, "table");
+    const std::string op = edit.text_at("op");
+    const std::string table = edit.text_at("table");
     if (op == "add") return add(table, edit.find("value").value_or(Json::object()));
     if (op == "delete") return remove(table, edit);
     if (op != "set" && op != "remove") return no_edit("there is no edit '" + op + "'");
-    const std::string key = member(edit, "key");
+    const std::string key = edit.text_at("key");
     if (key.empty()) return no_edit("the edit names no key");
     MODAR_ASSIGN(const TableName place, own_table(table, edit));
     if (op == "remove") return take(remove_key(text_, place, key));
-    const Json value = edit.find("value").value_or(Json());
+    const Json value = edit["value"];
     if (key == "name" && is_asset(table)) MODAR_TRY(rename(table, edit, place, value));
     if (table == "scene") MODAR_TRY(clear_sizes(place, key));
     return take(set_key(text_, place, key, value));
@@ -56,7 +52,7 @@ class Edits {
     if (table == "scene") {
       MODAR_TRY(write_scenes());
       // What followed from the names and was written out a moment ago is the one that is meant.
-      const auto same = scene_of(member(keys, "pattern"), member(keys, "model"));
+      const auto same = scene_of(keys.text_at("pattern"), keys.text_at("model"));
       if (same && implied_.count(*same) != 0) {
         for (const std::string& key : keys.keys()) {
           MODAR_TRY(take(set_key(text_, {"scene", same}, key, *keys.find(key))));
@@ -73,8 +69,7 @@ class Edits {
   void look() { draft_ = read_draft(text_, file_); }
 
   Result<void> take(Result<std::string> changed) {
-    if (!changed) return tl::unexpected(changed.error());
-    text_ = std::move(*changed);
+    MODAR_ASSIGN(text_, std::move(changed));
     look();
     return {};
   }
@@ -107,16 +102,16 @@ class Edits {
     if (table == "project" || table == "bake" || table == "gates") {
       return TableName{table, std::nullopt};
     }
-    const auto index = edit.find("index").value_or(Json()).count();
+    const auto index = edit["index"].count();
     if (table == "scene" && !index) return scene_table(edit);
-    if (is_asset(table) && edit.find("name")) return asset_table(table, member(edit, "name"));
+    if (is_asset(table) && edit.find("name")) return asset_table(table, edit.text_at("name"));
     if (!index) return no_edit("the edit names no table");
     return TableName{table, static_cast<std::size_t>(*index)};
   }
 
   Result<TableName> scene_table(const Json& edit) {
     MODAR_TRY(write_scenes());
-    const auto index = scene_of(member(edit, "pattern"), member(edit, "model"));
+    const auto index = scene_of(edit.text_at("pattern"), edit.text_at("model"));
     if (!index) return no_edit("there is no such scene");
     return TableName{"scene", index};
   }
@@ -179,7 +174,7 @@ class Edits {
                       const Json& value) {
     const std::string now = value.text().value_or("");
     if (now.empty() || printable(now) != now) return no_edit("the name has no letters");
-    std::string before = member(edit, "name");
+    std::string before = edit.text_at("name");
     for (const ProjectAsset& asset : assets(table)) {
       if (before.empty() && asset.table == place.index) before = asset.name;
     }
@@ -196,7 +191,7 @@ class Edits {
   }
 
   Result<void> remove(const std::string& table, const Json& edit) {
-    if (table == "scene" && !edit.find("index").value_or(Json()).count()) {
+    if (table == "scene" && !edit["index"].count()) {
       MODAR_ASSIGN(const TableName place, scene_table(edit));
       return take(remove_table(text_, place));
     }
@@ -204,8 +199,8 @@ class Edits {
       MODAR_ASSIGN(const TableName place, own_table(table, edit));
       return take(remove_table(text_, place));
     }
-    std::string name = member(edit, "name");
-    const auto index = edit.find("index").value_or(Json()).count();
+    std::string name = edit.text_at("name");
+    const auto index = edit["index"].count();
     for (const ProjectAsset& asset : assets(table)) {
       if (name.empty() && index && asset.table == *index) name = asset.name;
     }
@@ -262,7 +257,7 @@ Result<std::string> edited_text(const std::string& text, const std::string& file
   MODAR_TRY(check_syntax(text, file));
   if (!edits.is_array()) return no_edit("there are no edits");
   Edits changed(text, file);
-  for (std::size_t i = 0; i < edits.size(); ++i) MODAR_TRY(changed.apply(*edits.at(i)));
+  for (const Json& edit : edits.elements()) MODAR_TRY(changed.apply(edit));
   return checked(text, changed.text(), file);
 }
 

@@ -29,7 +29,7 @@ void publish_progress(Session& session, const Job& job, const std::string& line,
                       const Clock::time_point& start) {
   if (!line.starts_with('{')) return;
   const Json told = Json::parse(line);
-  const double done = told.find("done").value_or(Json()).number().value_or(0);
+  const double done = told.number_at("done");
   const double elapsed = std::chrono::duration<double>(Clock::now() - start).count();
   const bool guess = elapsed > kEstimateAfter && done > 0.02;
   session.events.publish("progress",
@@ -79,14 +79,9 @@ bool told_cancelled(Session& session, const Job& job) {
 /// The errors of `modar bake --json` as the page reads them.
 Json errors_of(const Json& outcome) {
   Json errors = Json::array();
-  const Json list = outcome.find("errors").value_or(Json());
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    const Json one = *list.at(i);
-    const auto text = [&](const char* key) {
-      return one.find(key).value_or("").text().value_or("");
-    };
-    errors.push_back(
-        json_of(Error{ExitCode::kOk, text("code"), text("where"), text("cause"), text("cure")}));
+  for (const Json& one : outcome["errors"].elements()) {
+    errors.push_back(json_of(Error{ExitCode::kOk, one.text_at("code"), one.text_at("where"),
+                                   one.text_at("cause"), one.text_at("cure")}));
   }
   return errors;
 }
@@ -98,20 +93,17 @@ struct ShownPart {
 };
 
 ShownPart shown_part(Session& session, const Json& scenes, const std::string& shown) {
-  const auto text_in = [](const Json& json, const char* key) {
-    return json.find(key).value_or("").text().value_or("");
-  };
   ShownPart part;
   std::string pattern;
   std::set<std::string> models;
-  for (std::size_t i = 0; i < scenes.size(); ++i) {
-    const std::string one = text_in(*scenes.at(i), "pattern");
+  for (const Json& scene : scenes.elements()) {
+    const std::string one = scene.text_at("pattern");
     if (pattern.empty() || one == shown) pattern = one;
   }
-  for (std::size_t i = 0; i < scenes.size(); ++i) {
-    if (text_in(*scenes.at(i), "pattern") != pattern) continue;
-    models.insert(text_in(*scenes.at(i), "model"));
-    part.scenes.push_back(*scenes.at(i));
+  for (const Json& scene : scenes.elements()) {
+    if (scene.text_at("pattern") != pattern) continue;
+    models.insert(scene.text_at("model"));
+    part.scenes.push_back(scene);
   }
   const auto state = session.text.read();
   if (!state || part.scenes.size() == 0) return part;
@@ -166,8 +158,7 @@ void bake(Session& session, Job& job, Json scenes, const std::string& shown) {
     const std::lock_guard lock(session.mutex);
     session.baked_scenes = std::move(scenes);
   }
-  const Json bundles = outcome.find("bundles").value_or(Json::array());
-  const Json first = bundles.at(0).value_or(Json());
+  const Json first = outcome["bundles"][0];
   keep_findings(session, outcome.find("findings").value_or(Json::array()));
   const std::chrono::duration<double> seconds = Clock::now() - start;
   session.events.publish("baked", {{"job", job.number},
@@ -193,12 +184,11 @@ std::string stem_of(const std::string& bundle) {
 std::vector<std::string> web_command(const std::string& bundle, const std::string& folder,
                                      const Json& body) {
   std::vector<std::string> words = {own_program(), "web", bundle, "-o", folder, "--quiet"};
-  const std::string title = body.find("title").value_or("").text().value_or("");
+  const std::string title = body.text_at("title");
   if (!title.empty()) words.insert(words.end(), {"--title", title});
-  const Json languages = body.find("languages").value_or(Json());
   std::string list;
-  for (std::size_t i = 0; i < languages.size(); ++i) {
-    list += (list.empty() ? "" : ",") + languages.at(i)->text().value_or("");
+  for (const Json& language : body["languages"].elements()) {
+    list += (list.empty() ? "" : ",") + language.text().value_or("");
   }
   if (!list.empty()) words.insert(words.end(), {"--languages", list});
   return words;
@@ -240,7 +230,7 @@ Result<Export> export_of(Session& session, const std::string& kind, const Json& 
     MODAR_TRY(can_make_app());
     made.path = out + "/" + name + ".apk";
     made.commands = {{app_script(), bundle, "--out", made.path}};
-    const std::string title = body.find("title").value_or("").text().value_or("");
+    const std::string title = body.text_at("title");
     if (!title.empty()) made.commands[0].insert(made.commands[0].end(), {"--title", title});
   } else {
     return fail(ExitCode::kUsage, "studio.request", kind, "there is no such export",
@@ -269,7 +259,7 @@ void publish_command_failure(Session& session, const Job& job, const ProcessResu
     return publish_failure(session, job, error_in(ran.errors, "the export"), Json::array());
   }
   std::string names;
-  for (std::size_t i = 0; i < packages.size(); ++i) names += " " + *packages.at(i)->text();
+  for (const Json& package : packages.elements()) names += " " + *package.text();
   Json told =
       json_of(Error{ExitCode::kUnsupported, "studio.package", job.kind,
                     "this machine lacks programs that this needs", "sudo apt-get install" + names});
@@ -324,8 +314,9 @@ void run_export(Session& session, Job& job, const Export& made) {
                          {{"job", job.number}, {"kind", job.kind}, {"path", path}, {"url", url}});
 }
 
-Answer started(const Result<std::uint64_t>& job) {
-  return job ? answer_of(Json{{"job", *job}}, 202) : answer_of(job.error());
+Result<Answer> started(const Result<std::uint64_t>& job) {
+  MODAR_TRY(job);
+  return answer_of(Json{{"job", *job}}, 202);
 }
 
 }  // namespace
@@ -375,27 +366,24 @@ Result<std::string> baked_bundle(Session& session, const std::string& tier) {
               "add a picture and a model, and bake");
 }
 
-Answer post_bake(Session& session, const Json& body) {
-  const auto view = project_view(session);
-  if (!view) return answer_of(view.error());
+Result<Answer> post_bake(Session& session, const Json& body) {
+  MODAR_ASSIGN(const Json view, project_view(session));
   return started(session.jobs.start(
-      "bake", [&session, scenes = view->find("scenes").value_or(Json()),
-               shown = body.find("shown").value_or("").text().value_or("")](Job& job) {
+      "bake", [&session, scenes = view["scenes"], shown = body.text_at("shown")](Job& job) {
         bake(session, job, scenes, shown);
       }));
 }
 
-Answer post_export(Session& session, const Json& body) {
-  const std::string kind = body.find("kind").value_or("").text().value_or("");
-  const auto made = export_of(session, kind, body);
-  if (!made) return answer_of(made.error());
-  return started(session.jobs.start(
-      kind, [&session, made = *made](Job& job) { run_export(session, job, made); }));
+Result<Answer> post_export(Session& session, const Json& body) {
+  const std::string kind = body.text_at("kind");
+  MODAR_ASSIGN(const Export made, export_of(session, kind, body));
+  return started(
+      session.jobs.start(kind, [&session, made](Job& job) { run_export(session, job, made); }));
 }
 
-Answer cancel_job(Session& session) {
+Result<Answer> cancel_job(Session& session) {
   if (session.jobs.cancel()) return answer_of(Json::object());
-  return answer_of(Error{ExitCode::kUsage, "studio.nothing", "", "nothing is being made", ""});
+  return fail(ExitCode::kUsage, "studio.nothing", "", "nothing is being made", "");
 }
 
 }  // namespace modar

@@ -11,10 +11,10 @@ namespace modar {
 struct Session;
 
 /// POST api/bake, POST api/export: start a job, whose events tell the rest.
-Answer post_bake(Session& session, const Json& body);
-Answer post_export(Session& session, const Json& body);
+Result<Answer> post_bake(Session& session, const Json& body);
+Result<Answer> post_export(Session& session, const Json& body);
 /// DELETE api/job.
-Answer cancel_job(Session& session);
+Result<Answer> cancel_job(Session& session);
 
 /// Path of the project's first bundle, or of that of a tier, which has been baked. Errors: kUsage
 /// "studio.not-baked".

@@ -45,6 +45,13 @@ Answer answer_of(const Json& json, int status) {
   return answer;
 }
 
+Answer jpeg_answer(std::string bytes) {
+  Answer answer;
+  answer.type = "image/jpeg";
+  answer.body = std::move(bytes);
+  return answer;
+}
+
 Json json_of(const Error& error) {
   Json json = {
       {"error", error.cause}, {"cure", error.cure}, {"code", error.code}, {"where", error.where}};

@@ -34,6 +34,7 @@ struct Answer {
 };
 
 Answer answer_of(const Json& json, int status = 200);
+Answer jpeg_answer(std::string bytes);
 /// {"error", "cure", "code", "where", "file", "line"} with the status of its code.
 Answer answer_of(const Error& error);
 /// The members of an error as the page reads them.

@@ -45,26 +45,22 @@ void serve(Session& session, Job& job, const std::string& bundle,
 
 }  // namespace
 
-Answer post_phone(Session& session) {
+Result<Answer> post_phone(Session& session) {
   {
     const std::lock_guard lock(session.mutex);
     if (!session.phone.is_null()) return answer_of(session.phone);
   }
-  const auto bundle = baked_bundle(session);
-  if (!bundle) return answer_of(bundle.error());
+  MODAR_ASSIGN(const std::string bundle, baked_bundle(session));
   const auto start = std::make_shared<Start>();
-  const auto started = session.phone_server.start(
-      "phone",
-      [&session, bundle = *bundle, start](Job& job) { serve(session, job, bundle, start); });
-  if (!started) return answer_of(started.error());
+  MODAR_TRY(session.phone_server.start(
+      "phone", [&session, bundle, start](Job& job) { serve(session, job, bundle, start); }));
   std::unique_lock lock(start->mutex);
   start->changed.wait_for(lock, kStarts, [&] { return start->ended || !start->url.empty(); });
   if (start->url.empty()) {
     lock.unlock();
     session.phone_server.cancel();
-    return answer_of(Error{ExitCode::kUnsupported, "web.page", "",
-                           "the page for phones cannot be served",
-                           "`modar web` in a terminal says why"});
+    return fail(ExitCode::kUnsupported, "web.page", "", "the page for phones cannot be served",
+                "`modar web` in a terminal says why");
   }
   const Json phone = {{"url", start->url}, {"qr_svg", qr_svg(start->url)}};
   const std::lock_guard session_lock(session.mutex);
@@ -73,7 +69,7 @@ Answer post_phone(Session& session) {
   return answer_of(phone);
 }
 
-Answer end_phone(Session& session) {
+Result<Answer> end_phone(Session& session) {
   session.phone_server.end();
   return answer_of(Json::object());
 }

@@ -9,9 +9,9 @@ struct Session;
 
 /// POST api/phone: writes the page and serves it as `modar web --serve --live` does; {"url",
 /// "qr_svg"}.
-Answer post_phone(Session& session);
+Result<Answer> post_phone(Session& session);
 /// DELETE api/phone.
-Answer end_phone(Session& session);
+Result<Answer> end_phone(Session& session);
 /// Phones that show the page show the new bundle.
 void refresh_phone(Session& session);
 

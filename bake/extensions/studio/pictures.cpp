@@ -64,13 +64,6 @@ Result<std::shared_ptr<const SmallPhoto>> small_photo(Session& session, const st
   return session.pictures.photos.add(key, std::move(small), bytes);
 }
 
-Answer picture_answer(std::string bytes, const char* type) {
-  Answer answer;
-  answer.type = type;
-  answer.body = std::move(bytes);
-  return answer;
-}
-
 Result<std::string> thumb_of(Session& session, const std::string& path, std::uint32_t side) {
   const std::string key = std::to_string(side) + "|" + key_of(path);
   if (const auto known = session.pictures.thumbs.find(key)) return *known;
@@ -81,11 +74,11 @@ Result<std::string> thumb_of(Session& session, const std::string& path, std::uin
 
 Result<std::array<PixelPoint, 4>> corners_in(const Json& body) {
   std::array<PixelPoint, 4> corners{};
-  const Json list = body.find("corners").value_or(Json());
+  const Json list = body["corners"];
   bool good = list.size() == 4;
   for (std::size_t i = 0; good && i < 4; ++i) {
-    const auto x = list.at(i)->at(0).value_or(Json()).number();
-    const auto y = list.at(i)->at(1).value_or(Json()).number();
+    const auto x = list[i][0].number();
+    const auto y = list[i][1].number();
     good = x && y;
     if (good) corners[i] = {*x, *y};
   }
@@ -100,27 +93,22 @@ Json corners_json(const std::array<PixelPoint, 4>& corners) {
   });
 }
 
-double number_in(const Json& body, const char* key) {
-  return body.find(key).value_or(Json()).number().value_or(0);
-}
-
 /// Of a photo's pixels, in those of a smaller copy.
 PixelPoint scaled(const PixelPoint& point, double scale) {
   return {(point.x + 0.5) * scale - 0.5, (point.y + 0.5) * scale - 0.5};
 }
 
 Result<Rectified> preview(Session& session, const Json& body) {
-  MODAR_ASSIGN(const std::string path,
-               file_inside(session.folder, body.find("file").value_or("").text().value_or("")));
+  MODAR_ASSIGN(const std::string path, file_inside(session.folder, body.text_at("file")));
   MODAR_ASSIGN(const auto photo, small_photo(session, path));
   RectifyOptions options;
   MODAR_ASSIGN(options.corners, corners_in(body));
   const double scale = 1.0 * photo->image.width / photo->width;
   for (PixelPoint& corner : options.corners) corner = scaled(corner, scale);
-  options.width_mm = number_in(body, "width_mm");
-  options.height_mm = number_in(body, "height_mm");
+  options.width_mm = body.number_at("width_mm");
+  options.height_mm = body.number_at("height_mm");
   options.focal_px = photo->focal_px * scale;
-  options.max_side = static_cast<std::uint32_t>(std::clamp(number_in(body, "size"), 64.0, 720.0));
+  options.max_side = static_cast<std::uint32_t>(std::clamp(body.number_at("size"), 64.0, 720.0));
   return rectify(photo->image, options);
 }
 
@@ -262,60 +250,51 @@ Result<Json> rivals_of(Session& session, const std::string& name) {
 
 }  // namespace
 
-Answer get_thumb(Session& session, const Call& call) {
-  const auto file = file_inside(session.folder, call.path.substr(10));
-  if (!file) return answer_of(file.error());
+Result<Answer> get_thumb(Session& session, const Call& call) {
+  MODAR_ASSIGN(const std::string file, file_inside(session.folder, call.path.substr(10)));
   const long asked = std::strtol(call.asked("size").c_str(), nullptr, 10);
   const auto side = asked <= 0 ? 256U
                                : std::clamp(static_cast<std::uint32_t>(std::min(asked, 100000L)),
                                             kLeastThumb, kMostThumb);
-  const auto thumb = thumb_of(session, *file, side);
-  return thumb ? picture_answer(*thumb, "image/jpeg") : answer_of(thumb.error());
+  MODAR_ASSIGN(std::string thumb, thumb_of(session, file, side));
+  return jpeg_answer(std::move(thumb));
 }
 
-Answer get_photo(Session& session, const Call& call) {
-  const auto named = pattern_named(session, call.asked("pattern"));
-  if (!named) return answer_of(named.error());
-  const auto photo = small_photo(session, named->path);
-  if (!photo) return answer_of(photo.error());
-  return answer_of(Json{
-      {"width", (*photo)->width}, {"height", (*photo)->height}, {"focal_px", (*photo)->focal_px}});
+Result<Answer> get_photo(Session& session, const Call& call) {
+  MODAR_ASSIGN(const NamedAsset named, pattern_named(session, call.asked("pattern")));
+  MODAR_ASSIGN(const auto photo, small_photo(session, named.path));
+  return answer_of(
+      Json{{"width", photo->width}, {"height", photo->height}, {"focal_px", photo->focal_px}});
 }
 
-Answer get_picture(Session& session, const Call& call) {
-  const auto named = pattern_named(session, call.asked("pattern"));
-  if (!named) return answer_of(named.error());
-  const ProjectAsset& asset = named->asset;
-  auto picture = read_pattern_picture(named->path, asset.width_mm, asset.shape);
-  if (!picture) return answer_of(picture.error());
-  const auto jpeg = encode_jpeg(no_larger(std::move(*picture), 720), kPreviewQuality);
-  return jpeg ? picture_answer(text_of(*jpeg), "image/jpeg") : answer_of(jpeg.error());
+Result<Answer> get_picture(Session& session, const Call& call) {
+  MODAR_ASSIGN(const NamedAsset named, pattern_named(session, call.asked("pattern")));
+  MODAR_ASSIGN(RgbaImage picture,
+               read_pattern_picture(named.path, named.asset.width_mm, named.asset.shape));
+  MODAR_ASSIGN(const auto jpeg, encode_jpeg(no_larger(std::move(picture), 720), kPreviewQuality));
+  return jpeg_answer(text_of(jpeg));
 }
 
-Answer get_score(Session& session, const Call& call) {
-  const auto named = pattern_named(session, call.asked("pattern"));
-  if (!named) return answer_of(named.error());
-  const auto one = graded(session, *named);
-  return one ? answer_of(score_json(**one)) : answer_of(one.error());
+Result<Answer> get_score(Session& session, const Call& call) {
+  MODAR_ASSIGN(const NamedAsset named, pattern_named(session, call.asked("pattern")));
+  MODAR_ASSIGN(const auto one, graded(session, named));
+  return answer_of(score_json(*one));
 }
 
-Answer get_rivals(Session& session, const Call& call) {
+Result<Answer> get_rivals(Session& session, const Call& call) {
   return answer_or_error(rivals_of(session, call.asked("pattern")));
 }
 
-Answer post_corners(Session& session, const Json& body) {
-  const auto path = file_inside(session.folder, body.find("file").value_or("").text().value_or(""));
-  if (!path) return answer_of(path.error());
-  const auto photo = read_photo(*path);
-  if (!photo) return answer_of(photo.error());
-  const auto small = small_photo(session, *path);  // the next is a preview
-  if (!small) return answer_of(small.error());
-  const double right = photo->image.width - 0.5;
-  const double bottom = photo->image.height - 0.5;
+Result<Answer> post_corners(Session& session, const Json& body) {
+  MODAR_ASSIGN(const std::string path, file_inside(session.folder, body.text_at("file")));
+  MODAR_ASSIGN(const Photo photo, read_photo(path));
+  MODAR_TRY(small_photo(session, path));  // the next is a preview
+  const double right = photo.image.width - 0.5;
+  const double bottom = photo.image.height - 0.5;
   const std::array<PixelPoint, 4> whole = {
       PixelPoint{-0.5, -0.5}, {right, -0.5}, {right, bottom}, {-0.5, bottom}};
-  const auto found = find_corners(photo->image);
-  const FoundPicture picture = find_picture(*photo, found);
+  const auto found = find_corners(photo.image);
+  const FoundPicture picture = find_picture(photo, found);
   const std::string reason = found ? found->doubt() : "not-found";
   return answer_of(
       Json{{"corners", corners_json(picture.corners.value_or(found ? found->corners : whole))},
@@ -323,18 +302,16 @@ Answer post_corners(Session& session, const Json& body) {
            {"doubt", *picture.doubt != 0},
            {"sure", found && reason.empty()},
            {"reason", reason},
-           {"width", photo->image.width},
-           {"height", photo->image.height}});
+           {"width", photo.image.width},
+           {"height", photo.image.height}});
 }
 
-Answer post_rectify(Session& session, const Json& body) {
-  const auto done = preview(session, body);
-  if (!done) return answer_of(done.error());
-  const auto jpeg = encode_jpeg(done->image, kPreviewQuality);
-  if (!jpeg) return answer_of(jpeg.error());
-  Answer answer = picture_answer(text_of(*jpeg), "image/jpeg");
-  answer.headers = {{"X-Aspect", std::to_string(done->aspect.aspect)},
-                    {"X-Aspect-Spread", std::to_string(done->aspect.spread)}};
+Result<Answer> post_rectify(Session& session, const Json& body) {
+  MODAR_ASSIGN(const Rectified done, preview(session, body));
+  MODAR_ASSIGN(const auto jpeg, encode_jpeg(done.image, kPreviewQuality));
+  Answer answer = jpeg_answer(text_of(jpeg));
+  answer.headers = {{"X-Aspect", std::to_string(done.aspect.aspect)},
+                    {"X-Aspect-Spread", std::to_string(done.aspect.spread)}};
   return answer;
 }
 

@@ -34,12 +34,12 @@ struct PictureCaches {
 };
 
 /// The verbs of the same names.
-Answer get_thumb(Session& session, const Call& call);
-Answer get_photo(Session& session, const Call& call);
-Answer get_picture(Session& session, const Call& call);
-Answer get_score(Session& session, const Call& call);
-Answer get_rivals(Session& session, const Call& call);
-Answer post_corners(Session& session, const Json& body);
-Answer post_rectify(Session& session, const Json& body);
+Result<Answer> get_thumb(Session& session, const Call& call);
+Result<Answer> get_photo(Session& session, const Call& call);
+Result<Answer> get_picture(Session& session, const Call& call);
+Result<Answer> get_score(Session& session, const Call& call);
+Result<Answer> get_rivals(Session& session, const Call& call);
+Result<Answer> post_corners(Session& session, const Json& body);
+Result<Answer> post_rectify(Session& session, const Json& body);
 
 }  // namespace modar

@@ -220,7 +220,7 @@ void add_facts(Json& json, const std::map<std::string, Json>& facts, const std::
                std::initializer_list<const char*> keys) {
   const auto found = facts.find(name);
   const Json own = found == facts.end() ? Json() : found->second;
-  for (const char* key : keys) json.set(key, own.find(key).value_or(Json()));
+  for (const char* key : keys) json.set(key, own[key]);
 }
 
 Json phone_of(Session& session) {

@@ -73,14 +73,10 @@ std::string findings_file(const Session& session) {
 Json bake_warnings(const Session& session, const BundleView& bundle) {
   const Json kept = Json::parse(read_file(findings_file(session), kMostFindings).value_or(""));
   Json warnings = Json::array();
-  if (kept.find("bundle").value_or("").text() != std::to_string(bundle.header().hash)) {
-    return warnings;
-  }
-  const Json findings = kept.find("findings").value_or(Json::array());
-  for (std::size_t i = 0; i < findings.size(); ++i) {
-    const Json one = *findings.at(i);
-    const auto text = [&](const char* key) { return one.find(key).value_or(""); };
-    if (text("severity").text() != "warning" || text("id").text() == kNeverShown) continue;
+  if (kept.text_at("bundle") != std::to_string(bundle.header().hash)) return warnings;
+  for (const Json& one : kept["findings"].elements()) {
+    const auto text = [&](const char* key) { return one.text_at(key); };
+    if (text("severity") != "warning" || text("id") == kNeverShown) continue;
     warnings.push_back({{"severity", "warning"},
                         {"id", text("id")},
                         {"where", text("file")},
@@ -122,7 +118,7 @@ Result<Json> check(Session& session, const std::string& device) {
   for (const NeverShown& what : assets_of(project, project.bundles.front()).never_shown) {
     warnings.push_back(never_shown_json(what));
   }
-  for (std::size_t i = 0; i < warnings.size(); ++i) findings.push_back(*warnings.at(i));
+  for (Json& warning : warnings.elements()) findings.push_back(std::move(warning));
   return Json{{"good", verdict.good()},
               {"errors", verdict.errors()},
               {"warnings", verdict.warnings() + warnings.size()},
@@ -270,15 +266,15 @@ BakedFacts baked_facts(const std::string& bundle) {
   return facts;
 }
 
-Answer get_check(Session& session, const Call& call) {
+Result<Answer> get_check(Session& session, const Call& call) {
   return answer_or_error(check(session, call.asked("device")));
 }
 
-Answer get_sizes(Session& session) {
+Result<Answer> get_sizes(Session& session) {
   return answer_or_error(sizes(session));
 }
 
-Answer get_devices(Session& session) {
+Result<Answer> get_devices(Session& session) {
   return answer_or_error(devices(session));
 }
 

@@ -12,13 +12,13 @@ namespace modar {
 struct Session;
 
 /// The verbs of the same names.
-Answer get_check(Session& session, const Call& call);
-Answer get_sizes(Session& session);
-Answer get_devices(Session& session);
+Result<Answer> get_check(Session& session, const Call& call);
+Result<Answer> get_sizes(Session& session);
+Result<Answer> get_devices(Session& session);
 
 /// GET api/thumb/vase.obj?size=160&turn=8: views of a model all around, side by side in one
 /// picture, as the device draws the last bake. 404 if none exists yet.
-Answer get_turntable(Session& session, const Call& call);
+Result<Answer> get_turntable(Session& session, const Call& call);
 
 /// What the last bake made of each asset, by its name: of models {"triangles", "size", "up"}, of
 /// patterns {"grade", "score", "range_cm"}. Empty before.

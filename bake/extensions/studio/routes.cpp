@@ -15,47 +15,45 @@ namespace modar {
 namespace {
 
 /// The project after a change of its text, and notifies all pages.
-Answer changed(Session& session, const Result<ProjectText::State>& state) {
-  if (!state) return answer_of(state.error());
+Result<Answer> changed(Session& session, const Result<ProjectText::State>& state) {
+  MODAR_TRY(state);
   session.events.publish("project", {{"revision", state->revision}});
   return answer_or_error(project_view(session));
 }
 
-Answer edit(Session& session, const Json& body) {
-  const std::string revision = body.find("revision").value_or("").text().value_or("");
-  const Json edits = body.find("edits").value_or(Json());
+Result<Answer> edit(Session& session, const Json& body) {
+  const std::string revision = body.text_at("revision");
+  const Json edits = body["edits"];
   return changed(session, session.text.edit(revision, [&](const std::string& text) {
     return edited_text(text, session.file, edits);
   }));
 }
 
 /// What `modar init` writes.
-Answer init(Session& session) {
+Result<Answer> init(Session& session) {
   return changed(session, session.text.edit("", [&](const std::string&) -> Result<std::string> {
     MODAR_ASSIGN(InitialProject initial, initial_project(session.folder));
     return std::move(initial.text);
   }));
 }
 
-Answer send_file(const Session& session, const std::string& name) {
-  const auto file = file_inside(session.folder, name);
-  if (!file) return answer_of(file.error());
+Result<Answer> send_file(const Session& session, const std::string& name) {
+  MODAR_ASSIGN(const std::string file, file_inside(session.folder, name));
   Answer answer;
   answer.type = "application/octet-stream";
-  answer.file = *file;
+  answer.file = file;
   return answer;
 }
 
-Answer send_bundle(Session& session, const Call& call) {
-  const auto path = baked_bundle(session, call.asked("tier"));
-  return path ? send_file(session, *path) : answer_of(path.error());
+Result<Answer> send_bundle(Session& session, const Call& call) {
+  MODAR_ASSIGN(const std::string path, baked_bundle(session, call.asked("tier")));
+  return send_file(session, path);
 }
 
 /// The folder of the result, in the desktop's own program for files.
-Answer show_folder(Session& session) {
-  const auto state = session.text.read();
-  if (!state) return answer_of(state.error());
-  const std::string folder = path_in(session, read_draft(state->text, session.file).project.out);
+Result<Answer> show_folder(Session& session) {
+  MODAR_ASSIGN(const ProjectText::State state, session.text.read());
+  const std::string folder = path_in(session, read_draft(state.text, session.file).project.out);
   // Without a desktop xdg-open may begin a browser in our terminal, and wait for it.
   const auto is_set = [](const char* name) {
     const char* value = std::getenv(name);
@@ -63,11 +61,11 @@ Answer show_folder(Session& session) {
   };
   const bool desktop = is_set("DISPLAY") || is_set("WAYLAND_DISPLAY");
   if (desktop && run_process({{"xdg-open", folder}, {}, {}}) == 0) return answer_of(Json::object());
-  return answer_of(Error{ExitCode::kUnsupported, "studio.show", "", "no file manager responds",
-                         "open it yourself: " + folder});
+  return fail(ExitCode::kUnsupported, "studio.show", "", "no file manager responds",
+              "open it yourself: " + folder);
 }
 
-Answer answer_get(Session& session, const Call& call) {
+Result<Answer> answer_get(Session& session, const Call& call) {
   if (call.path == "api/project") return answer_or_error(project_view(session));
   if (call.path == "api/bundle") return send_bundle(session, call);
   if (call.path == "api/check") return get_check(session, call);
@@ -86,11 +84,11 @@ Answer answer_get(Session& session, const Call& call) {
   return answer_of(unknown_verb(call));
 }
 
-Answer answer_post(Session& session, const Call& call) {
+Result<Answer> answer_post(Session& session, const Call& call) {
   const Json body = Json::parse(call.body);
   if (body.is_null()) {
-    return answer_of(Error{ExitCode::kUsage, "studio.request", call.path, "the request is not JSON",
-                           "reload the page"});
+    return fail(ExitCode::kUsage, "studio.request", call.path, "the request is not JSON",
+                "reload the page");
   }
   if (call.path == "api/edit") return edit(session, body);
   if (call.path == "api/undo") return changed(session, session.text.undo());
@@ -109,9 +107,7 @@ Answer answer_post(Session& session, const Call& call) {
   return answer_of(unknown_verb(call));
 }
 
-}  // namespace
-
-Answer answer_call(Session& session, const Call& call) {
+Result<Answer> routed(Session& session, const Call& call) {
   if (call.method == "GET") return answer_get(session, call);
   if (call.method == "POST") return answer_post(session, call);
   if (call.method == "DELETE" && call.path == "api/job") return cancel_job(session);
@@ -120,6 +116,13 @@ Answer answer_call(Session& session, const Call& call) {
     return take_upload(session, call);
   }
   return answer_of(unknown_verb(call));
+}
+
+}  // namespace
+
+Answer answer_call(Session& session, const Call& call) {
+  Result<Answer> answer = routed(session, call);
+  return answer ? std::move(*answer) : answer_of(answer.error());
 }
 
 }  // namespace modar

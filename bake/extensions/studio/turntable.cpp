@@ -81,21 +81,16 @@ Result<std::string> strip(Session& session, const std::string& name, const AllAr
 
 }  // namespace
 
-Answer get_turntable(Session& session, const Call& call) {
+Result<Answer> get_turntable(Session& session, const Call& call) {
   const std::string file = call.path.substr(std::string_view("api/thumb/").size());
-  const auto state = session.text.read();
-  if (!state) return answer_of(state.error());
-  const ProjectDraft draft = read_draft(state->text, session.file);
+  MODAR_ASSIGN(const ProjectText::State state, session.text.read());
+  const ProjectDraft draft = read_draft(state.text, session.file);
   const auto& models = draft.project.models;
   const auto model = ranges::find(models, file, &ProjectAsset::file);
   if (model == models.end()) return answer_of(unknown_verb(call));
   const AllAround turn{number_in(call, "size", 32, 320), number_in(call, "turn", 1, 16)};
-  const auto drawn = strip(session, model->name, turn);
-  if (!drawn) return answer_of(drawn.error());
-  Answer answer;
-  answer.type = "image/jpeg";
-  answer.body = *drawn;
-  return answer;
+  MODAR_ASSIGN(std::string drawn, strip(session, model->name, turn));
+  return jpeg_answer(std::move(drawn));
 }
 
 }  // namespace modar

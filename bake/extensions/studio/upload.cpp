@@ -278,9 +278,8 @@ void add_missing_of_gltf(const Session& session, const std::string& path,
   const fs::path own = fs::path(path).parent_path();
   const ModelFolder folder(own.string(), session.folder);
   for (const char* list : {"buffers", "images"}) {
-    const Json entries = json.find(list).value_or(Json());
-    for (std::size_t i = 0; i < entries.size(); ++i) {
-      const std::string uri = entries.at(i)->find("uri").value_or("").text().value_or("");
+    for (const Json& entry : json[list].elements()) {
+      const std::string uri = entry.text_at("uri");
       if (uri.empty() || uri.starts_with("data:")) continue;
       const std::string name = without_percents(uri);
       const bool there = folder.has((own / name).string()) ||
@@ -303,7 +302,7 @@ std::vector<std::string> missing_of(const Session& session, const std::string& f
   return missing;
 }
 
-Answer take_upload(Session& session, const Call& call) {
+Result<Answer> take_upload(Session& session, const Call& call) {
   const std::string name = call.path.substr(std::string_view("api/files/").size());
   return answer_or_error(add_upload(session, call.upload, name));
 }

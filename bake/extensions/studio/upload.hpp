@@ -10,7 +10,7 @@ namespace modar {
 
 /// Takes the file at call.upload, or the files of an archive, and lists models and pictures in
 /// modar.toml. Files that are there already are never changed.
-Answer take_upload(Session& session, const Call& call);
+Result<Answer> take_upload(Session& session, const Call& call);
 
 /// Textures, MTL files and buffers that a model names and that are not there, relative to the
 /// project's folder. file: the same.

@@ -40,22 +40,18 @@ const char* returned(const Json& json) {
   return studio->text.c_str();
 }
 
-std::string text_in(const Json& json, const char* key) {
-  return json.find(key).value_or("").text().value_or("");
-}
-
 }  // namespace
 
 // ---- what a studio of this kind does not have ----
 
-Answer post_phone(Session&) {
-  return answer_of(Error{ExitCode::kUnsupported, "studio.phone", "",
-                         "this studio cannot serve the result to a phone",
-                         "`modar web BUNDLE -o FOLDER --serve` in a terminal does; or download the "
-                         "page as a ZIP file and put it on a web server"});
+Result<Answer> post_phone(Session&) {
+  return fail(
+      ExitCode::kUnsupported, "studio.phone", "", "this studio cannot serve the result to a phone",
+      "`modar web BUNDLE -o FOLDER --serve` in a terminal does; or download the page as a ZIP "
+      "file and put it on a web server");
 }
 
-Answer end_phone(Session&) {
+Result<Answer> end_phone(Session&) {
   return answer_of(Json::object());
 }
 
@@ -97,13 +93,13 @@ extern "C" EMSCRIPTEN_KEEPALIVE const char* studio_call(const char* request) {
   using namespace modar;
   const Json json = Json::parse(request);
   Call call;
-  call.method = text_in(json, "method");
-  call.path = text_in(json, "path");
-  call.body = text_in(json, "body");
-  call.upload = text_in(json, "upload");
+  call.method = json.text_at("method");
+  call.path = json.text_at("path");
+  call.body = json.text_at("body");
+  call.upload = json.text_at("upload");
   const Json query = json.find("query").value_or(Json::object());
   for (const std::string& name : query.keys()) {
-    call.query.emplace(name, text_in(query, name.c_str()));
+    call.query.emplace(name, query.text_at(name));
   }
   studio->answer = answer_call(studio->session, call);
   const Answer& answer = studio->answer;
