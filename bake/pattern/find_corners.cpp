@@ -596,6 +596,15 @@ std::array<Point, 4> push_out(const Gradients& gradients, const std::array<Point
   return next;
 }
 
+/// Whether sharp edges are next to a figure, as those of the paper are around a printed frame.
+bool is_inner(const Gradients& gradients, const std::array<Point, 4>& corners) {
+  constexpr double kMoved = 4;  // pixels; the other edge of the same line is nearer
+  const std::array<Point, 4> outer = push_out(gradients, corners);
+  double moved = 0;
+  for (std::size_t i = 0; i < 4; ++i) moved = std::max(moved, norm_of(outer[i] - corners[i]));
+  return moved > kMoved;
+}
+
 /// Moves sides that stopped at a shadow or a printed frame to the edge that divides the object from
 /// its background.
 std::array<Point, 4> settle(const Gradients& gradients, const Foreground& object,
@@ -1118,7 +1127,8 @@ Result<FoundCorners> search(const RgbaImage& photo) {
   found.rivalled = object.rivalled();
   found.holds =
       holds_another(small, gradients, corners) || holds_a_figure(gradients, figures, corners);
-  found.bordered = bordered(gradients, corners) || within_band(small, corners);
+  found.bordered =
+      bordered(gradients, corners) || within_band(small, corners) || is_inner(gradients, corners);
   const double fine = std::max(1.0, std::max(rgb.cols, rgb.rows) / kRefineSide);
   if (fine > 1) cv::resize(rgb, rgb, cv::Size(), 1 / fine, 1 / fine, cv::INTER_AREA);
   const double step = scale / fine;

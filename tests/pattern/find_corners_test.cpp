@@ -318,6 +318,20 @@ TEST(FindPicture, TheInsideOfABlackBorderIsDoubted) {
   EXPECT_EQ(alarms, 0);
 }
 
+TEST(FindPicture, ABlackBorderThatIsSeenAtOneSideOnlyIsDoubted) {
+  const Corners corners = {
+      {{250.3f, 150.6f}, {720.2f, 120.4f}, {760.8f, 560.1f}, {220.7f, 520.9f}}};
+  cv::Mat table(720, 960, CV_8UC3, cv::Scalar(12, 12, 13));
+  table.rowRange(430, 720) = cv::Scalar(20, 30, 60);
+  for (const char* name : {"painting.png", "cover.png"}) {
+    cv::Mat pattern = asset(name);
+    const int border = cvRound(0.06 * std::min(pattern.cols, pattern.rows));
+    cv::copyMakeBorder(pattern, pattern, border, border, border, border, cv::BORDER_CONSTANT,
+                       cv::Scalar(14, 14, 14));
+    EXPECT_FALSE(verdict(photograph(pattern, table, corners), corners).silent) << name;
+  }
+}
+
 TEST(FindPicture, LinesOfATableThatContinueAPrintAreNoSheet) {
   const Corners corners = {
       {{250.3f, 150.6f}, {720.2f, 120.4f}, {760.8f, 560.1f}, {220.7f, 520.9f}}};
