@@ -302,7 +302,7 @@ class SceneReader {
     return places.skinned() ? parts_.group(group).to_stored : parts_.to_stored(node_) * copy;
   }
 
-  /// Nothing of such a material shows what is behind it, whatever its alpha.
+  /// Such a material hides all behind it, whatever its alpha.
   [[nodiscard]] bool opaque(int material) const {
     const auto number = static_cast<std::size_t>(material);
     return material < 0 || number >= gltf_.materials.size() ||
