@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <iterator>
 
-#include "bake/bundle/scene/scene_placement.hpp"
 #include "bake/check/device/device_rules.hpp"
 #include "bake/check/yml_rule.hpp"
 #include "formats/bundle_view.hpp"
@@ -190,19 +189,13 @@ void report_preview(const BundleView& bundle, const IssueSink& sink) {
         std::nullopt});
 }
 
-void report_unseen(const BundleView& bundle, const IssueSink& sink) {
-  const auto tell = [&](WorkstationRule rule, const void* place, const char* what, NameRef name) {
-    const auto at = static_cast<const std::byte*>(place) - bundle.bytes().data();
-    sink({&workstation_issue_kind(rule), what + (" '" + std::string(bundle.name(name)) + "'"),
-          static_cast<std::uint64_t>(at), "", std::nullopt});
-  };
+void report_unseen_patterns(const BundleView& bundle, const IssueSink& sink) {
   for (const PatternRecord& pattern : bundle.patterns()) {
     if (pattern.score_version == 0 || pattern.score != 0) continue;
-    tell(WorkstationRule::kPatternUnseen, &pattern, "pattern", pattern.name);
-  }
-  for (const SceneRecord& scene : bundle.scenes()) {
-    if (!draws_nothing(bundle, scene)) continue;
-    tell(WorkstationRule::kModelUnseen, &scene, "model", bundle.models()[scene.model].name);
+    const auto at = reinterpret_cast<const std::byte*>(&pattern) - bundle.bytes().data();
+    sink({&workstation_issue_kind(WorkstationRule::kPatternUnseen),
+          "pattern '" + std::string(bundle.name(pattern.name)) + "'",
+          static_cast<std::uint64_t>(at), "", std::nullopt});
   }
 }
 
@@ -217,7 +210,7 @@ bool check_whole(std::span<const std::byte> bytes, const DeviceProfile* device,
   if (!sound) return false;
   if (const auto bundle = BundleView::open(bytes)) {
     report_preview(*bundle, sink);
-    report_unseen(*bundle, sink);
+    report_unseen_patterns(*bundle, sink);
     if (device != nullptr) check_device(*bundle, *device, sink);
   }
   return true;

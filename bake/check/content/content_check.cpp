@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "bake/bundle/bundle_json.hpp"
+#include "bake/bundle/scene/scene_placement.hpp"
 #include "bake/check/content/content_rules.hpp"
 #include "bake/check/verdict.hpp"
 #include "bake/json.hpp"
@@ -196,6 +197,16 @@ void check_uses(ContentLog& log) {
   check_unused(log, "media", std::move(media));
 }
 
+void report_unseen_models(const BundleView& bundle, const IssueSink& sink) {
+  for (const SceneRecord& scene : bundle.scenes()) {
+    if (!draws_nothing(bundle, scene)) continue;
+    const auto at = reinterpret_cast<const std::byte*>(&scene) - bundle.bytes().data();
+    sink({&workstation_issue_kind(WorkstationRule::kModelUnseen),
+          "model '" + std::string(bundle.name(bundle.models()[scene.model].name)) + "'",
+          static_cast<std::uint64_t>(at), "", std::nullopt});
+  }
+}
+
 }  // namespace
 
 void check_statements(ContentLog& log) {
@@ -222,7 +233,10 @@ bool check_content(const BundleView& bundle, const IssueSink& sink, const Conten
 bool check_all(std::span<const std::byte> bytes, const DeviceProfile* device, unsigned jobs,
                const IssueSink& sink) {
   if (!check_whole(bytes, device, sink)) return false;
-  if (const auto bundle = BundleView::open(bytes)) check_content(*bundle, sink, {.jobs = jobs});
+  if (const auto bundle = BundleView::open(bytes)) {
+    report_unseen_models(*bundle, sink);
+    check_content(*bundle, sink, {.jobs = jobs});
+  }
   return true;
 }
 

@@ -14,6 +14,7 @@
 
 namespace tinygltf {
 class Model;
+class Node;
 }  // namespace tinygltf
 
 namespace modar {
