@@ -153,6 +153,11 @@ Outcome Attempts::check_object(Transfer& transfer) {
   if (!right) {
     ++stats_.corrupt;
     discard(transfer);
+    if (!is_server_) {  // reading it again gives the same
+      transfer.error = {kExitMixed, "fetch.damaged", address_of(transfer),
+                        "the file differs from the published one", "copy the release again, whole"};
+      return Outcome::kFailed;
+    }
     return again(transfer, page ? kWebPage : "the received data differs from the published data");
   }
   if (auto moved = object.folder->rename(transfer.part_name(), to_hex(object.id)); !moved) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "downloader.hpp"
+#include "formats/base/utf8.hpp"
 
 namespace modar::fetch {
 
@@ -61,6 +62,12 @@ Result<Transfers> Transfers::create(const TransferOptions& options) {
         State{Attempts(options, *folder, false),
               make_source_downloader(folder_source(*folder, options.bytes_per_second)),
               {}}));
+  }
+  const std::string scheme = ascii_lower(address.substr(0, address.find("://")));
+  if (scheme != "http" && scheme != "https") {
+    return fail(ExitCode::kUsage, "fetch.url", options.url,
+                "the address begins neither with http:// nor with https://",
+                "give http://HOST/PATH or a folder that `modar ship publish` filled");
   }
   MODAR_ASSIGN(auto downloader, make_curl_downloader(options, address));
   return Transfers(std::make_unique<State>(

@@ -60,7 +60,8 @@ class Transfers {
   Result<std::string> text(const std::string& path, std::size_t limit, bool optional = false);
 
   /// Downloads objects into their files, each verified by its id. `on_bytes` receives the number of
-  /// bytes since the last call (negative: discarded). Errors: as text(); kIo "io.*".
+  /// bytes since the last call (negative: discarded). Errors: as text(); kIo "io.*"; kExitMixed
+  /// "fetch.damaged" where a folder's file is not the published one.
   Result<void> objects(std::span<const ObjectRequest> requests,
                        const std::function<void(std::int64_t)>& on_bytes);
 

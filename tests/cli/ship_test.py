@@ -754,8 +754,20 @@ class Refusals(ShipTest):
             self.assertEqual(done.returncode, 2, words)
             self.assertIn("io.stdout", done.stderr)
 
+    def test_a_damaged_file_of_a_folder_is_named_at_once(self):
+        self.publish(self.shop.old)
+        damaged = max((path for path in (self.site / "objects").rglob("*") if path.is_file()), key=lambda path: path.stat().st_size)
+        good = damaged.read_bytes()
+        damaged.write_bytes(good[:-1] + bytes([good[-1] ^ 1]))
+        failed = self.fetch()
+        self.assert_fails(failed, 13, "fetch.damaged", damaged.name, "copy the release again")
+        self.assertNotIn("attempt", failed.stderr)
+        damaged.write_bytes(good)
+        self.assertEqual(self.fetch().returncode, 0)
+
     def test_usage(self):
-        self.assert_fails(self.fetch(self.folder / "nowhere"), 1, "fetch.url")
+        for address in (self.folder / "nowhere", "htp://museum.example/ar", "ftp://museum.example/ar"):
+            self.assert_fails(self.fetch(address), 1, "fetch.url")
         self.assert_fails(self.run_program("modar-fetch"), 1, "--store")
         self.assert_fails(self.run_program("modar-fetch", "--stroe", "x"), 1, "--stroe")
         self.assertEqual(self.run_program("modar-fetch", "--help").returncode, 0)

@@ -479,6 +479,7 @@ class Page(StudioTest):
         hand = self.hand
         hand.run("location.hash = '#/picture/band'")
         hand.wait("document.querySelector('canvas[data-shown]')", "the preview, below which the lengths are")
+        hand.settle()
         hand.click("input[value=a4]")
         self.wait_for("width = \"297mm\"")
         hand.wait("document.querySelector('.advice a')", "the twin, which is a rival")
