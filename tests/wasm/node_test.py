@@ -187,7 +187,7 @@ class Library(unittest.TestCase):
         self.assertEqual(get("/app.js", Range="bytes=-7")[1], (site / "app.js").read_bytes()[-7:])
         self.assertEqual(get("/app.js", Range="bytes=99999999-")[0].status, 416)
         (site / "link.txt").symlink_to(bundle)
-        for path in ("/.modar-output", "/../served.modar", "/%2e%2e/served.modar", "/link.txt", "/none", "/%ff"):
+        for path in ("/.modar-output", "/../served.modar", "/%2e%2e/served.modar", "/link.txt", "/none", "/%ff", "//", "//x:y"):
             self.assertEqual(get(path)[0].status, 404, path)
 
     def test_node_has_what_the_native_program_has(self):

@@ -24,6 +24,7 @@ const MOST_POST_BYTES = 4 * 2 ** 20;
 const MOST_UPLOAD_BYTES = 2 ** 31;
 const MOST_LISTENERS = 8;
 const SILENT_MS = 10_000;
+const REFUSED_MS = 1_000;  // for which the rest of a refused body is read
 const BEAT_MS = 5_000;  // so often a page hears that the studio is there
 const SECRET_BYTES = 20;
 const VALID_DAYS = 7;
@@ -45,6 +46,16 @@ function fileInside(folder, name) {
     const below = path.relative(root, file);
     const outside = !below || below.startsWith('.') || path.isAbsolute(below);
     return outside || !fs.statSync(file).isFile() ? null : file;
+  } catch {
+    return null;
+  }
+}
+
+/** What a request names below the server's root, decoded, and its query; null where it is no address. */
+function addressOf(request) {
+  const [wanted, query = ''] = request.url.split(/\?(.*)/s, 2);
+  try {
+    return { name: decodeURIComponent(wanted), query: new URLSearchParams(query) };
   } catch {
     return null;
   }
@@ -136,9 +147,7 @@ function serveSite({ folder, bind, port: number }) {
   const addresses = bind === '0.0.0.0' ? own : bind.startsWith('127.') ? [] : [bind];
   const server = https.createServer(makeCertificate(addresses), (request, response) => {
     for (const [name, value] of Object.entries(SITE_HEADERS)) response.setHeader(name, value);
-    const { pathname } = new URL(request.url, 'https://x');
-    let name = '';
-    try { name = decodeURIComponent(pathname); } catch { /* no name: nothing is found */ }
+    const name = addressOf(request)?.name ?? '';
     const file = ['GET', 'HEAD'].includes(request.method) && fileInside(toSystem(folder), name.endsWith('/') ? `${name}index.html` : name);
     if (file) sendFile(request, response, file);
     else response.writeHead(404).end();
@@ -201,25 +210,26 @@ class Studio {
       .end('the address is not complete: open the one that the studio has shown\n');
     if (request.url.length > MOST_PATH) return refuse(414);
     if (!this.isOurs(request)) return refuse(403);
-    const { pathname, searchParams } = new URL(request.url, 'http://x');
-    if (request.method === 'GET' && pathname.startsWith('/open-') && this.openings.delete(pathname.slice(6))) {
+    const address = addressOf(request);
+    if (!address) return refuse(403);
+    if (request.method === 'GET' && address.name.startsWith('/open-') && this.openings.delete(address.name.slice(6))) {
       return response.writeHead(303, { Location: `/${this.secret}/` }).end();
     }
-    if (!this.hasSecret(pathname)) return refuse(403);
-    let name = '';
-    try { name = decodeURIComponent(pathname.slice(this.secret.length + 2)); } catch { return refuse(403); }
+    if (!this.hasSecret(address.name)) return refuse(403);
+    const name = address.name.slice(this.secret.length + 2);
+    const query = Object.fromEntries([...address.query].reverse());  // the first of each name
     const method = request.method === 'HEAD' ? 'GET' : request.method;
     if (!['GET', 'POST', 'PUT', 'DELETE'].includes(method)) return refuse(405);
-    if (method === 'GET') return this.get(request, response, name, searchParams);
-    const call = { method, path: name, query: Object.fromEntries([...searchParams].reverse()), body: '' };
+    if (method === 'GET') return this.get(request, response, name, query);
+    const call = { method, path: name, query, body: '' };
     if (method === 'PUT') return this.put(request, response, call);
     return this.post(request, response, call);
   }
 
-  get(request, response, name, searchParams) {
+  get(request, response, name, query) {
     if (name === 'api/events') return this.listen(request, response);
     if (name === 'api/opening') return response.writeHead(200, { 'Content-Type': 'text/plain' }).end(this.openOnce());
-    if (name.startsWith('api/')) return this.ask(request, response, { method: 'GET', path: name, query: Object.fromEntries([...searchParams].reverse()), body: '' });
+    if (name.startsWith('api/')) return this.ask(request, response, { method: 'GET', path: name, query, body: '' });
     const file = name.startsWith('engine/') ? fileInside(toSystem(options.engine), name.slice(7)) : fileInside(toSystem(options.page), name || 'index.html');
     if (file) return sendFile(request, response, file);
     return this.wrong(response, 404, { error: 'there is no such file', cure: 'reload the page', code: 'studio.unknown' });
@@ -265,8 +275,9 @@ class Studio {
     const look = () => {
       if (bytes <= most || response.writableEnded) return bytes > most;
       refused();
-      request.removeAllListeners('data').removeAllListeners('end').pause();
-      response.on('finish', () => request.destroy()).setHeader('Connection', 'close');
+      request.unpipe().removeAllListeners('data').removeAllListeners('end').resume();
+      // Who still sends reads the answer after that, and would see the end of the connection alone.
+      response.on('finish', () => setTimeout(() => request.destroy(), REFUSED_MS)).setHeader('Connection', 'close');
       this.wrong(response, 413, { error: 'it is too large', cure: "make it smaller, or copy it into the project's folder yourself", code: 'studio.too-large' });
       return true;
     };
