@@ -72,7 +72,7 @@ Detection* ExtendedTracking::choose_anchor(TrackResult& result) {
   Detection* largest = nullptr;
   double most = 0;
   for (Detection& one : result.visible) {
-    if (patterns_[anchor_].index == one.pattern) return &one;
+    if (patterns_[anchor_].shown_by(one.pattern, one.copy)) return &one;
     const glm::dvec2 a = one.corners[2] - one.corners[0];
     const glm::dvec2 b = one.corners[3] - one.corners[1];
     const double area = std::abs(a.x * b.y - a.y * b.x);
@@ -82,7 +82,7 @@ Detection* ExtendedTracking::choose_anchor(TrackResult& result) {
   }
   if (largest == nullptr || following_ || surroundings_.ready()) return nullptr;
   for (std::size_t i = 0; i < patterns_.size(); ++i) {
-    if (patterns_[i].index == largest->pattern) anchor_ = i;
+    if (patterns_[i].shown_by(largest->pattern, largest->copy)) anchor_ = i;
   }
   surroundings_.clear();
   usual_patches_ = 0;
@@ -124,6 +124,7 @@ bool ExtendedTracking::follow_surroundings(bool shown, const glm::dvec3* turn,
     return false;
   }
   detection.pattern = patterns_[anchor_].index;
+  detection.copy = patterns_[anchor_].copy;
   detection.pose = extended.pose;
   detection.extended = true;
   detection.position_sigma = extended.position_sigma;

@@ -47,6 +47,7 @@ constexpr double kFading = 0.99;
 bool FrameTracker::locate(const TrackedPattern& pattern, const Track& track,
                           Detection& detection) const {
   detection.pattern = pattern.index;
+  detection.copy = pattern.copy;
   detection.pose = track.pose;
   const PlaneMap map =
       track.homography_only ? track.map : map_of_pose(pattern, camera_, track.pose);
@@ -59,7 +60,6 @@ std::array<glm::dvec2, 4> FrameTracker::place(const TrackedPattern& pattern, con
   return claimed_place(pattern, map_of_pose(pattern, camera_, track.pose), detection.corners);
 }
 
-/// Pixels between the pattern's centre at two poses.
 double FrameTracker::distance(const TrackedPattern& pattern, const Pose& a, const Pose& b) const {
   const auto centre = [&](const Pose& at) {
     bool in_front = false;

@@ -52,10 +52,11 @@ class FrameTracker {
   /// The place that it takes in the frame, for same_place().
   [[nodiscard]] std::array<glm::dvec2, 4> place(const TrackedPattern& pattern, const Track& track,
                                                 const Detection& detection) const;
+  /// Pixels between the pattern's centre at two poses.
+  [[nodiscard]] double distance(const TrackedPattern& pattern, const Pose& a, const Pose& b) const;
 
  private:
   bool update_pose(const TrackedPattern& pattern, Track& track, PatchFit& fit);
-  [[nodiscard]] double distance(const TrackedPattern& pattern, const Pose& a, const Pose& b) const;
   bool refine_predicted(const TrackedPattern& pattern, const Track& track, Pose& pose,
                         PatchFit& fit) const;
   bool reacquire(const TrackedPattern& pattern, const Track& track, const Pose& predicted,

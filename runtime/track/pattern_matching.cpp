@@ -335,6 +335,18 @@ std::size_t PlaneMatcher::fit(const FeatureMatch& hypothesis, glm::dmat3& homogr
   return collect(homography, 3.0, mask_);
 }
 
+void PlaneMatcher::forget(const PlaneMap& map) {
+  // Pixels of a feature's level by which a copy's features may be off it. Higher hides copies that
+  // lie close on each other. Not swept.
+  constexpr double kExplained = 12.0;
+  std::erase_if(matches_, [&](const FeatureMatch& match) {
+    bool in_front = false;
+    const glm::dvec2 miss = map.at(match.pattern, in_front) - match.ideal;
+    const double limit = kExplained * match.sigma;
+    return in_front && glm::dot(miss, miss) < limit * limit;
+  });
+}
+
 void PlaneMatcher::begin_vote(std::size_t most) {
   order_.clear();
   for (std::uint32_t i = 0; i < matches_.size(); ++i) order_.push_back(i);

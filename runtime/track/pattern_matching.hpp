@@ -71,6 +71,9 @@ class PlaneMatcher {
   /// instructions match() may take; it subtracts what it took.
   bool match(const TrackedPattern& pattern, std::span<const TrackerFeature> features,
              std::size_t count, std::size_t end, std::size_t& next, std::int64_t& work);
+  /// Drops the matches that a copy of the pattern at this place explains. map: to undistorted
+  /// pixels.
+  void forget(const PlaneMap& map);
   /// Counts the matches that agree with each of the `most` nearest ones: vote() until it returns
   /// true.
   void begin_vote(std::size_t most);

@@ -79,6 +79,12 @@ std::size_t max_codes(std::span<const TrackedPattern> patterns) {
   return most;
 }
 
+std::size_t count_of_copies(std::span<const TrackedPattern> patterns) {
+  std::size_t count = 0;
+  for (const TrackedPattern& pattern : patterns) count += pattern.copies;
+  return count;
+}
+
 /// Whether `other` is within the outline that a pattern has by one vote, with a margin.
 bool covers(const TrackedPattern& pattern, const FeatureMatch& place, const FeatureMatch& other) {
   const glm::dvec2 size(pattern.width(), pattern.height());
@@ -100,6 +106,7 @@ bool covers(const TrackedPattern& pattern, const FeatureMatch& place, const Feat
                max_codes(patterns)) {
   selected_.reserve(patterns.size());
   has_votes_.resize(patterns.size());
+  known_.reserve(count_of_copies(patterns));
 }
 
 /// Leaves in selected_ the patterns to match in full; the first likely_ of them are probably there.
@@ -153,19 +160,23 @@ bool PatternSearch::prepare(std::int64_t work) {
 }
 
 void PatternSearch::run(FeatureExtractor& extractor, std::span<const SearchPriority> priorities,
-                        DetectionCandidates& candidates) {
+                        std::span<const KnownCopy> known, DetectionCandidates& candidates) {
   prepare(std::numeric_limits<std::int64_t>::max());
-  begin(extractor, priorities, candidates);
+  begin(extractor, priorities, known, candidates);
   advance(std::numeric_limits<std::int64_t>::max());
 }
 
 void PatternSearch::begin(FeatureExtractor& extractor, std::span<const SearchPriority> priorities,
-                          DetectionCandidates& candidates) {
+                          std::span<const KnownCopy> known, DetectionCandidates& candidates) {
   extractor_ = &extractor;
   priorities_ = priorities;
   candidates_ = &candidates;
   candidates.patterns.resize(patterns_.size());
+  candidates.copies.reserve(known_.capacity());
+  candidates.copies.clear();
+  candidates.crowded = -1;
   candidates.times = {};
+  known_.assign(known.begin(), known.end());
   stage_ = Stage::kFeatures;
   at_ = 0;
   found_ = false;
@@ -267,6 +278,14 @@ void PatternSearch::match_features(const TrackedPattern& pattern, std::int64_t& 
   const std::size_t ends[] = {(count + 1) / 2, count, features.size()};
   const std::size_t end = ends[static_cast<std::size_t>(features_)];
   if (!matcher_.match(pattern, features, count, end, next_feature_, work)) return;
+  begin_vote();
+}
+
+/// Votes with the matches that no known copy explains.
+void PatternSearch::begin_vote() {
+  for (const KnownCopy& copy : known_) {
+    if (copy.pattern == selected_[at_]) matcher_.forget(copy.map);
+  }
   matcher_.begin_vote(features_ == Features::kSpare ? kSpareVotes : kVotes);
   stage_ = Stage::kVote;
 }
@@ -340,9 +359,65 @@ void PatternSearch::conclude(const TrackedPattern& pattern, const FrameView& fra
   }
   if (candidate.reason == Reason::kVisible && bent(pattern)) candidate.reason = Reason::kCurved;
   found_ = found_ || candidate.reason == Reason::kVisible;
+  if (candidate.reason == Reason::kVisible && go_on_with_copies(pattern, frame)) return;
   ++at_;
   next_feature_ = 0;
   features_ = Features::kHalf;
+}
+
+/// A copy was found: whether the search goes on for another one, among the other matches.
+bool PatternSearch::go_on_with_copies(const TrackedPattern& pattern, const FrameView& frame) {
+  const std::uint32_t which = selected_[at_];
+  const auto known = std::count_if(known_.begin(), known_.end(),
+                                   [&](const KnownCopy& copy) { return copy.pattern == which; });
+  if (known + 1 >= static_cast<std::ptrdiff_t>(pattern.copies)) {
+    if (shows_another(pattern, frame))
+      candidates_->crowded = static_cast<std::int32_t>(pattern.index);
+    return false;
+  }
+  const DetectionCandidate& found = candidates_->patterns[which];
+  KnownCopy copy{
+      which, found.homography_only ? found.map : map_of_pose(pattern, camera_, found.pose), {}};
+  std::array<glm::dvec2, 4> corners{};
+  if (found.homography_only ? !map_corners(pattern, copy.map, corners)
+                            : !locate_corners(pattern, copy.map, corners)) {
+    return false;
+  }
+  copy.place = pattern.surface.flat() ? corners : claimed_place(pattern, copy.map, corners);
+  copy.map.lens = nullptr;
+  known_.push_back(copy);
+  candidates_->copies.emplace_back(which, found);
+  candidates_->patterns[which] = {};
+  begin_vote();
+  return true;
+}
+
+/// Whether the features left over show one more copy than may be tracked.
+bool PatternSearch::shows_another(const TrackedPattern& pattern, const FrameView& frame) const {
+  std::array<glm::dvec2, 4> found;
+  if (!pattern.surface.flat() ||
+      !map_corners(pattern,
+                   map_of_pose(pattern, camera_, candidates_->patterns[selected_[at_]].pose),
+                   found)) {
+    return false;
+  }
+  for (const HomographyHypothesis& each : hypotheses_) {
+    if (each.inliers < kMapInliers) return false;
+    const PlaneMap map{each.homography, distorting_lens(camera_)};
+    std::array<glm::dvec2, 4> corners;
+    if (map_corners(pattern, map, corners) && plausible(corners) && !same_place(found, corners) &&
+        !is_known(corners) && map_photometric_percent(pattern, frame, map) > 0) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Whether a known copy of the pattern takes that place.
+bool PatternSearch::is_known(const std::array<glm::dvec2, 4>& place) const {
+  return std::any_of(known_.begin(), known_.end(), [&](const KnownCopy& copy) {
+    return copy.pattern == selected_[at_] && same_place(copy.place, place);
+  });
 }
 
 /// Continues the next hypothesis if it may exceed the best so far.
@@ -457,6 +532,12 @@ void PatternSearch::consider(const TrackedPattern& pattern, const FrameView& fra
       !locate_corners(pattern, map_of_pose(pattern, camera_, one.pose), corners)) {
     return;
   }
+  if (!known_.empty() &&
+      is_known(pattern.surface.flat()
+                   ? corners
+                   : claimed_place(pattern, map_of_pose(pattern, camera_, one.pose), corners))) {
+    return;
+  }
   best_ = one;
   best_hypothesis_ = hypothesis_;
   DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
@@ -501,6 +582,7 @@ void PatternSearch::find_map(const TrackedPattern& pattern, const FrameView& fra
   std::array<glm::dvec2, 4> corners;
   const auto pose = nearest_pose(pattern, camera_, map);
   if (!pose || !map_corners(pattern, map, corners) || !plausible(corners)) return;
+  if (is_known(corners)) return;
   candidate = {Reason::kVisible, *pose, true, map, false, candidate.matches, hypothesis.inliers};
 }
 
@@ -515,10 +597,13 @@ void PatternSearch::find_map(const TrackedPattern& pattern, const FrameView& fra
       priorities(patterns.size(), SearchPriority::kNone) {
   frame = {pixels.data(), camera.width, camera.height, camera.width};
   found.patterns.resize(patterns.size());
+  known.reserve(count_of_copies(patterns));
 }
 
 void FrameSearch::set(const GrayImage& caller_frame,
-                      std::span<const SearchPriority> caller_priorities) {
+                      std::span<const SearchPriority> caller_priorities,
+                      std::span<const KnownCopy> caller_known) {
+  known.assign(caller_known.begin(), caller_known.end());
   for (int y = 0; y < frame.height; ++y) {
     std::memcpy(pixels.data() + y * frame.stride, caller_frame.pixels + y * caller_frame.stride,
                 static_cast<std::size_t>(frame.width));
@@ -526,10 +611,11 @@ void FrameSearch::set(const GrayImage& caller_frame,
   std::copy(caller_priorities.begin(), caller_priorities.end(), priorities.begin());
 }
 
-void SlicedDetector::start(const GrayImage& frame, std::span<const SearchPriority> priorities) {
-  job_.set(frame, priorities);
+void SlicedDetector::start(const GrayImage& frame, std::span<const SearchPriority> priorities,
+                           std::span<const KnownCopy> known) {
+  job_.set(frame, priorities, known);
   job_.extractor->set_frame(job_.frame);
-  job_.search.begin(*job_.extractor, job_.priorities, job_.found);
+  job_.search.begin(*job_.extractor, job_.priorities, job_.known, job_.found);
   busy_ = true;
 }
 
@@ -560,8 +646,9 @@ AsyncDetector::~AsyncDetector() {
   thread_.join();
 }
 
-void AsyncDetector::start(const GrayImage& frame, std::span<const SearchPriority> priorities) {
-  job_.set(frame, priorities);
+void AsyncDetector::start(const GrayImage& frame, std::span<const SearchPriority> priorities,
+                          std::span<const KnownCopy> known) {
+  job_.set(frame, priorities, known);
   stage_.store(Stage::kSearching, std::memory_order_release);
   wake_.release();
 }
@@ -579,7 +666,7 @@ void AsyncDetector::work() {
     wake_.acquire();
     if (closing_.load(std::memory_order_acquire)) return;
     job_.extractor->set_frame(job_.frame);
-    job_.search.run(*job_.extractor, job_.priorities, job_.found);
+    job_.search.run(*job_.extractor, job_.priorities, job_.known, job_.found);
     stage_.store(Stage::kFound, std::memory_order_release);
   }
 }

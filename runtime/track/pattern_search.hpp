@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "modar/tracker.hpp"
@@ -39,8 +40,18 @@ struct DetectionCandidate {
   int inliers = 0;
 };
 
+/// A copy of a print whose place is known: a search leaves out what it explains.
+struct KnownCopy {
+  std::uint32_t pattern = 0;
+  PlaneMap map;  ///< to undistorted frame pixels
+  std::array<glm::dvec2, 4> place{};
+};
+
 struct DetectionCandidates {
   std::vector<DetectionCandidate> patterns;  ///< unchanged where the priority was kNone
+  /// Further copies, with their patterns. In `patterns` there is the one that was tried last.
+  std::vector<std::pair<std::uint32_t, DetectionCandidate>> copies;
+  std::int32_t crowded = -1;  ///< TrackResult::crowded
   int features = 0;
   TrackTimes times;  ///< detect, match and homography
 };
@@ -54,17 +65,17 @@ class PatternSearch {
   /// contradicted each other, and hides nothing.
   PatternSearch(const Camera& camera, std::span<const TrackedPattern> patterns,
                 const DetectOptions& options, bool known_camera);
-  /// extractor: holds the frame. priorities: one per pattern. Allocates nothing after the first
-  /// call.
+  /// extractor: holds the frame. priorities: one per pattern. known: copies that are tracked, of
+  /// patterns of several copies. Allocates nothing after the first call.
   void run(FeatureExtractor& extractor, std::span<const SearchPriority> priorities,
-           DetectionCandidates& candidates);
+           std::span<const KnownCopy> known, DetectionCandidates& candidates);
   /// The same in slices: prepare() and advance() until they return true, begin() between them. The
   /// arguments must stay until then. work: about how many ARMv7 instructions advance() may take;
   /// the first step of a call is always taken, and none is interrupted: the longest takes some 5
   /// million.
   bool prepare(std::int64_t work);
   void begin(FeatureExtractor& extractor, std::span<const SearchPriority> priorities,
-             DetectionCandidates& candidates);
+             std::span<const KnownCopy> known, DetectionCandidates& candidates);
   bool advance(std::int64_t work);
 
  private:
@@ -85,10 +96,14 @@ class PatternSearch {
   bool step(std::int64_t& work);
   bool take_features(std::int64_t& work);
   void match_features(const TrackedPattern& pattern, std::int64_t& work);
+  void begin_vote();
   void take_hypotheses();
   void start_hypothesis(const TrackedPattern& pattern, const FrameView& frame);
   void after_start();
   void conclude(const TrackedPattern& pattern, const FrameView& frame);
+  bool go_on_with_copies(const TrackedPattern& pattern, const FrameView& frame);
+  [[nodiscard]] bool shows_another(const TrackedPattern& pattern, const FrameView& frame) const;
+  [[nodiscard]] bool is_known(const std::array<glm::dvec2, 4>& place) const;
   void next_hypothesis();
   [[nodiscard]] std::int64_t cost_of_step() const;
   /// A refined pose and the evidence for it.
@@ -134,6 +149,7 @@ class PatternSearch {
   std::vector<std::uint8_t> has_votes_;  ///< by pattern
   std::size_t likely_ = 0;               ///< the first of selected_, which are always matched
   std::uint32_t turn_ = 0;               ///< the pattern whose turn is next
+  std::vector<KnownCopy> known_;         ///< those of the caller, and those found
 
   // Of the search under way:
   FeatureExtractor* extractor_ = nullptr;
@@ -159,13 +175,15 @@ class PatternSearch {
 struct FrameSearch {
   FrameSearch(const Camera& camera, std::span<const TrackedPattern> patterns,
               const DetectOptions& options, bool known_camera);
-  void set(const GrayImage& caller_frame, std::span<const SearchPriority> caller_priorities);
+  void set(const GrayImage& caller_frame, std::span<const SearchPriority> caller_priorities,
+           std::span<const KnownCopy> caller_known);
 
   std::unique_ptr<FeatureExtractor> extractor;
   PatternSearch search;
   GrayImage frame;
   std::vector<std::uint8_t> pixels;
   std::vector<SearchPriority> priorities;
+  std::vector<KnownCopy> known;
   DetectionCandidates found;
 };
 
@@ -179,7 +197,8 @@ class SlicedDetector {
   /// False while it searches, and before the first search.
   [[nodiscard]] bool idle() const { return prepared_ && !busy_; }
   /// Starts a search; only if idle().
-  void start(const GrayImage& frame, std::span<const SearchPriority> priorities);
+  void start(const GrayImage& frame, std::span<const SearchPriority> priorities,
+             std::span<const KnownCopy> known);
   /// Continues it (PatternSearch::advance), or prepares for the first. In the call after the one
   /// that finished it, swaps out candidates and priorities, and returns true.
   bool advance(std::int64_t work, DetectionCandidates& candidates,
@@ -209,7 +228,8 @@ class AsyncDetector {
   /// False while a search runs or its candidates have not been taken.
   [[nodiscard]] bool idle() const { return stage_.load(std::memory_order_acquire) == Stage::kIdle; }
   /// Starts a search; only if idle(). priorities: one per pattern.
-  void start(const GrayImage& frame, std::span<const SearchPriority> priorities);
+  void start(const GrayImage& frame, std::span<const SearchPriority> priorities,
+             std::span<const KnownCopy> known);
   /// Swaps out the candidates and priorities of a finished search; false if none exists.
   bool take(DetectionCandidates& candidates, std::vector<SearchPriority>& priorities);
 

@@ -3,6 +3,7 @@
 #include "modar/pose_loop.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -46,8 +47,9 @@ struct PoseLoop::State {
 
   Camera camera;
   PoseLoopOptions options;
-  std::vector<TrackedPattern> patterns;
-  std::vector<Track> tracks;  ///< one per pattern
+  std::vector<TrackedPattern> patterns;  ///< the prints, then their further copies
+  std::vector<Track> tracks;             ///< one per pattern
+  std::vector<tracker::KnownCopy> known;
   tracker::FrameTracker frame_tracker;
   std::unique_ptr<tracker::SearchScheduler> search;
   std::unique_ptr<PrintVerifier> print_verifier;
@@ -59,6 +61,11 @@ struct PoseLoop::State {
   void calibrate();
   void track_all(TrackResult& result);
   void accept(TrackResult& result);
+  void accept(std::size_t print, const DetectionCandidate& candidate, TrackResult& result);
+  void add_copies();
+  void list_known();
+  [[nodiscard]] std::size_t place_for(std::size_t print, const Pose* pose) const;
+  bool drop_double(std::size_t i, const Detection& detection, TrackResult& result);
   bool start_track(const TrackedPattern& pattern, Track& track, const DetectionCandidate& candidate,
                    Detection& detection) const;
   bool measure(std::size_t i, Detection& detection);
@@ -99,7 +106,9 @@ PoseLoop::~PoseLoop() = default;
                 "the bundle holds no pattern with a record for this loop",
                 "bake it with a pattern");
   }
+  state->add_copies();
   state->tracks.resize(state->patterns.size());
+  state->known.reserve(state->patterns.size());
   state->search = std::make_unique<tracker::SearchScheduler>(camera, state->patterns, options);
   state->print_verifier =
       std::make_unique<PrintVerifier>(state->patterns, !options.estimate_camera);
@@ -149,6 +158,7 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
   result.visible.reserve(tracks.size());
   result.reason = Reason::kNoFeatures;
   result.features = 0;
+  result.crowded = -1;
   result.times = {};
   LapClock clock;
   if (calibration != nullptr) calibrate();
@@ -162,8 +172,9 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
       std::count_if(tracks.begin(), tracks.end(), [](const Track& track) { return track.tracked; });
   if (search->advance(tracked + (following ? 1 : 0))) accept(result);
   result.times.pose = clock.lap();
-  if (search->due(tracks, following) && search->start(frame, frame_tracker.extractor())) {
-    accept(result);
+  if (search->due(patterns, tracks, following)) {
+    list_known();
+    if (search->start(frame, frame_tracker.extractor(), known)) accept(result);
   }
   if (extended != nullptr) extended->step(result, turn.has_value() ? &*turn : nullptr);
   if (calibration != nullptr) calibration->place_pictures(result);
@@ -173,7 +184,97 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
     if (progress(reason) > progress(result.reason)) result.reason = reason;
   }
   std::sort(result.visible.begin(), result.visible.end(),
-            [](const Detection& a, const Detection& b) { return a.pattern < b.pattern; });
+            [](const Detection& a, const Detection& b) {
+              return a.pattern != b.pattern ? a.pattern < b.pattern : a.copy < b.copy;
+            });
+}
+
+/// Further copies follow the prints, so that those are numbered as if there were none.
+[[gnu::cold]] void PoseLoop::State::add_copies() {
+  constexpr int kMostCopies = 16;
+  const auto copies = static_cast<std::uint32_t>(std::clamp(options.max_instances, 1, kMostCopies));
+  const std::size_t prints = patterns.size();
+  for (std::size_t i = 0; i < prints; ++i) {
+    patterns[i].first = static_cast<std::uint32_t>(i);
+    patterns[i].copies = copies;
+  }
+  patterns.reserve(prints * copies);
+  for (std::uint32_t copy = 1; copy < copies; ++copy) {
+    for (std::size_t i = 0; i < prints; ++i) patterns.push_back(patterns[i]);
+    for (std::size_t i = 0; i < prints; ++i) patterns[copy * prints + i].copy = copy;
+  }
+}
+
+/// Where the copies are that a search need not find.
+void PoseLoop::State::list_known() {
+  known.clear();
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    Detection detection;
+    if (patterns[i].copies == 1 || !tracks[i].tracked ||
+        !frame_tracker.locate(patterns[i], tracks[i], detection)) {
+      continue;
+    }
+    tracker::KnownCopy& copy = known.emplace_back();
+    copy.pattern = patterns[i].first;
+    copy.map = tracks[i].homography_only
+                   ? tracks[i].map
+                   : tracker::map_of_pose(patterns[i], camera, tracks[i].pose);
+    copy.map.lens = nullptr;
+    copy.place = frame_tracker.place(patterns[i], tracks[i], detection);
+  }
+}
+
+/// The copy of a print that is not tracked and was seen last most like this, so that it keeps its
+/// number; patterns.size() if all are tracked. candidate: null: the first of them.
+std::size_t PoseLoop::State::place_for(std::size_t print, const Pose* pose) const {
+  // Share of the frame's width by which a copy may have moved to count as one that was lost.
+  constexpr double kNear = 0.25;
+  std::size_t best = patterns.size();
+  double least = std::numeric_limits<double>::infinity();
+  Track asked;
+  Detection there;
+  if (pose != nullptr) asked.pose = *pose;
+  const bool located = pose != nullptr && frame_tracker.locate(patterns[print], asked, there);
+  for (std::size_t i = print; i < patterns.size(); ++i) {
+    if (patterns[i].first != print || tracks[i].tracked) continue;
+    if (!located || patterns[i].copies == 1) return i;
+    Detection before;
+    const bool seen = tracks[i].pose.translation != Pose{}.translation &&
+                      frame_tracker.locate(patterns[i], tracks[i], before);
+    const double way =
+        seen ? tracker::corner_distance(there.corners, before.corners) : kNear * camera.width;
+    if (way >= least) continue;
+    least = way;
+    best = i;
+  }
+  return best;
+}
+
+/// A copy that another one covers is soon drawn to it: drops the one of the two that jumped. False
+/// if it is this one.
+bool PoseLoop::State::drop_double(std::size_t i, const Detection& detection, TrackResult& result) {
+  // Share of the diagonal within which two outlines are the same. Higher drops copies that lie
+  // close on each other.
+  constexpr double kSame = 0.1;
+  const double limit = kSame * glm::length(detection.corners[2] - detection.corners[0]);
+  for (std::size_t k = patterns[i].first; k < i; ++k) {
+    Detection other;
+    if (patterns[k].first != patterns[i].first || !tracks[k].tracked ||
+        !frame_tracker.locate(patterns[k], tracks[k], other) ||
+        tracker::corner_distance(other.corners, detection.corners) > limit) {
+      continue;
+    }
+    const bool this_one = tracks[i].prediction_error >= tracks[k].prediction_error;
+    Track& doubled = tracks[this_one ? i : k];
+    doubled.tracked = doubled.has_motion = false;
+    doubled.pose = doubled.previous;
+    doubled.frames_since_lost = 0;
+    doubled.last_reason = Reason::kLostByBlur;
+    if (this_one) return false;
+    std::erase_if(result.visible,
+                  [&](const Detection& s) { return patterns[k].shown_by(s.pattern, s.copy); });
+  }
+  return true;
 }
 
 /// Continues with the camera estimated from the frames so far.
@@ -204,6 +305,7 @@ void PoseLoop::State::track_all(TrackResult& result) {
       track.tracked = track.has_motion = false;
       track.last_reason = Reason::kFailedVerification;
     }
+    if (track.tracked && patterns[i].copies > 1 && !drop_double(i, detection, result)) continue;
     if (track.tracked && track.doubts > 0) {
       track.shown_reason = Reason::kLostByBlur;
     } else if (track.tracked) {
@@ -247,7 +349,8 @@ bool PoseLoop::State::show(std::size_t i, const PrintVerifier::Verification& ver
 
 /// The frame shows another pattern in the place of a tracked one: tracks that pattern instead.
 bool PoseLoop::State::switch_pattern(std::size_t from, std::size_t to, Detection& detection) {
-  if (tracks[to].tracked || tracks[from].homography_only) return false;
+  to = place_for(to, &tracks[from].pose);
+  if (to == patterns.size() || tracks[from].homography_only) return false;
   const TrackedPattern& pattern = patterns[to];
   Track next;
   next.pose = tracks[from].pose;
@@ -326,13 +429,14 @@ bool PoseLoop::State::resolve_overlap(std::size_t i, const Detection& detection,
         continue;
       }
       if (!drop) {
+        if (patterns[i].first == patterns[k].first) return false;
         if (percent_of(i) <= percent_of(k)) return false;
         continue;
       }
       tracks[k] = {};
       tracks[k].last_reason = Reason::kFailedVerification;
       std::erase_if(result.visible,
-                    [&](const Detection& s) { return s.pattern == other_detection.pattern; });
+                    [&](const Detection& s) { return patterns[k].shown_by(s.pattern, s.copy); });
     }
   }
   return true;
@@ -345,41 +449,51 @@ void PoseLoop::State::accept(TrackResult& result) {
   result.times.detect = candidates.times.detect;
   result.times.match = candidates.times.match;
   result.times.homography = candidates.times.homography;
-  for (std::size_t i = 0; i < tracks.size(); ++i) {
-    Track& track = tracks[i];
-    if (!search->searched(i) || track.tracked) continue;
-    const DetectionCandidate& candidate = candidates.patterns[i];
-    const Track before = track;
-    Detection detection;
-    if (calibration != nullptr) calibration->forget_plane(i);
-    bool here = candidate.reason == Reason::kVisible &&
-                start_track(patterns[i], track, candidate, detection);
-    if (here) {
-      track.verified = search->verifies_finds();
-      const bool slipped = before.verified && before.frames_since_lost < kRefoundFrames &&
-                           print_verifier->has_slipped(i, frame_tracker.frame(), track);
-      here = !slipped && (!track.verified || measure(i, detection));
-      if (!here) track = before;
-    }
-    Reason reason =
-        candidate.reason == Reason::kVisible ? Reason::kFailedVerification : candidate.reason;
-    if (here) {
-      PrintVerifier::Verification verification;
-      if (track.verified)
-        verification = print_verifier->verify_found(i, frame_tracker.frame(), track);
-      track.shown_reason = verification.reason;
-      if (resolve_overlap(i, detection, result)) {
-        if (!track.verified) verification.reason = before.last_reason;
-        show(i, verification, detection, result);
-        continue;
-      }
-      reason = Reason::kOtherPrint;
-      track = before;  // a recently lost one keeps its priority
-    }
-    // In the frame that lost it, the reason of the loss says more.
-    if (track.frames_since_lost > 0 || progress(reason) > progress(track.last_reason))
-      track.last_reason = reason;
+  result.crowded = candidates.crowded;
+  for (const auto& [print, candidate] : candidates.copies) accept(print, candidate, result);
+  for (std::size_t i = 0; i < candidates.patterns.size(); ++i) {
+    if (search->searched(i)) accept(i, candidates.patterns[i], result);
   }
+}
+
+/// The same of one candidate.
+void PoseLoop::State::accept(std::size_t print, const DetectionCandidate& candidate,
+                             TrackResult& result) {
+  const std::size_t i =
+      place_for(print, candidate.reason == Reason::kVisible ? &candidate.pose : nullptr);
+  if (i == patterns.size()) return;
+  Track& track = tracks[i];
+  const Track before = track;
+  Detection detection;
+  if (calibration != nullptr) calibration->forget_plane(i);
+  bool here =
+      candidate.reason == Reason::kVisible && start_track(patterns[i], track, candidate, detection);
+  if (here) {
+    track.verified = search->verifies_finds();
+    const bool slipped = before.verified && before.frames_since_lost < kRefoundFrames &&
+                         print_verifier->has_slipped(i, frame_tracker.frame(), track);
+    here = !slipped && (!track.verified || measure(i, detection));
+    if (!here) track = before;
+  }
+  Reason reason =
+      candidate.reason == Reason::kVisible ? Reason::kFailedVerification : candidate.reason;
+  if (here) {
+    PrintVerifier::Verification verification;
+    if (track.verified)
+      verification = print_verifier->verify_found(i, frame_tracker.frame(), track);
+    track.shown_reason = verification.reason;
+    if (resolve_overlap(i, detection, result)) {
+      if (!track.verified) verification.reason = before.last_reason;
+      show(i, verification, detection, result);
+      if (patterns[i].copies > 1) search->hurry();
+      return;
+    }
+    reason = Reason::kOtherPrint;
+    track = before;  // a recently lost one keeps its priority
+  }
+  // In the frame that lost it, the reason of the loss says more.
+  if (track.frames_since_lost > 0 || progress(reason) > progress(track.last_reason))
+    track.last_reason = reason;
 }
 
 }  // namespace modar

@@ -28,8 +28,11 @@ double blend(double seconds, double constant) {
 
 }  // namespace
 
-[[gnu::cold]] PoseSmoother::PoseSmoother(std::size_t pattern_count, double max_latency_ms)
-    : states_(pattern_count), max_latency_s_(std::clamp(max_latency_ms, 0.0, 1000.0) * 1e-3) {}
+[[gnu::cold]] PoseSmoother::PoseSmoother(std::size_t pattern_count, double max_latency_ms,
+                                         std::size_t copies)
+    : pattern_count_(pattern_count),
+      states_(pattern_count * copies),
+      max_latency_s_(std::clamp(max_latency_ms, 0.0, 1000.0) * 1e-3) {}
 
 /// Returns the latency in seconds.
 double PoseSmoother::smooth(double time_s, State& state, Detection& detection) const {
@@ -72,8 +75,9 @@ double PoseSmoother::step(double time_s, std::span<Detection> visible) {
   double slowest = 0.0;
   for (State& state : states_) state.seen = false;
   for (Detection& detection : visible) {
-    if (detection.pattern >= states_.size()) continue;
-    State& state = states_[detection.pattern];
+    const std::size_t at = detection.copy * pattern_count_ + detection.pattern;
+    if (detection.pattern >= pattern_count_ || at >= states_.size()) continue;
+    State& state = states_[at];
     state.seen = true;
     slowest = std::max(slowest, smooth(time_s, state, detection));
   }

@@ -90,9 +90,10 @@ glm::vec3 direction_of(const Pose& pose) {
 [[gnu::cold]] PrintVerifier::PrintVerifier(std::span<const TrackedPattern> patterns,
                                            bool known_camera)
     : patterns_(patterns),
+      prints_(count_of_prints(patterns)),
       known_camera_(known_camera),
       evidence_(patterns.size()),
-      relations_(patterns.size() * patterns.size()),
+      relations_(prints_ * prints_),
       mirrors_(patterns.size(), {Mirror{true}, Mirror{false}}) {
   for (const TrackedPattern& pattern : patterns) {
     regular_.push_back(pattern.surface.flat() && regular(pattern) ? 1 : 0);
@@ -353,7 +354,7 @@ PrintVerifier::Verification PrintVerifier::conclude(const TrackedPattern& print,
 }
 
 bool PrintVerifier::related_to(std::size_t a, std::size_t b, int& work) {
-  std::uint8_t& known = relations_[a * patterns_.size() + b];
+  std::uint8_t& known = relations_[a * prints_ + b];
   if (known == 0) {
     known = related(patterns_[a], patterns_[b]) ? 2 : 1;
     --work;
@@ -369,9 +370,10 @@ std::int32_t PrintVerifier::find_actual_pattern(std::size_t pattern, const Frame
   const PlaneMap map = map_of_track(patterns_[pattern], frame, track);
   std::int32_t actual_pattern = -1;
   int most = kActualCells - 1;
-  for (std::size_t tried = 1; tried < patterns_.size() && work > 0; ++tried) {
-    const std::size_t other = seen.next_other++ % patterns_.size();
-    if (other == pattern || !related_to(pattern, other, work)) continue;
+  const std::size_t first = patterns_[pattern].first;
+  for (std::size_t tried = 1; tried < prints_ && work > 0; ++tried) {
+    const std::size_t other = seen.next_other++ % prints_;
+    if (other == first || !related_to(first, other, work)) continue;
     --work;
     const PrintDifference difference =
         compare_prints(patterns_[pattern], patterns_[other], map, frame.pyramid);

@@ -100,10 +100,11 @@ class PrintVerifier {
   static Verification conclude(const TrackedPattern& print, Evidence& seen);
 
   std::span<const TrackedPattern> patterns_;
+  std::size_t prints_;  ///< the first of them; the others are further copies
   bool known_camera_;
   std::vector<Evidence> evidence_;       ///< by pattern
   std::vector<std::uint8_t> regular_;    ///< by pattern: whether it is regular()
-  std::vector<std::uint8_t> relations_;  ///< by two patterns: 0 not known yet, 1 none, 2 related
+  std::vector<std::uint8_t> relations_;  ///< by two prints: 0 not known yet, 1 none, 2 related
   /// By pattern: an upright mirror and one that is not, as place_mirrors() left them.
   std::vector<std::array<Mirror, 2>> mirrors_;
 };

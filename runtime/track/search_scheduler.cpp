@@ -16,7 +16,10 @@ constexpr int kVerifyingBudget = 20;
 [[gnu::cold]] SearchScheduler::SearchScheduler(const Camera& camera,
                                                std::span<const TrackedPattern> patterns,
                                                const PoseLoopOptions& options)
-    : options_(options), camera_(camera), patterns_(patterns.begin(), patterns.end()) {
+    : options_(options),
+      camera_(camera),
+      patterns_(patterns.begin(),
+                patterns.begin() + static_cast<std::ptrdiff_t>(count_of_prints(patterns))) {
   priorities_.resize(patterns_.size());
   candidates_.patterns.resize(patterns_.size());
   const bool known = !options.estimate_camera;
@@ -55,16 +58,18 @@ bool SearchScheduler::advance(std::ptrdiff_t tracked) {
   return sliced_->advance(work, candidates_, priorities_);
 }
 
-bool SearchScheduler::due(std::span<const Track> tracks, bool following) {
+bool SearchScheduler::due(std::span<const TrackedPattern> patterns, std::span<const Track> tracks,
+                          bool following) {
+  std::fill(priorities_.begin(), priorities_.end(), SearchPriority::kNone);
   bool missing = false;
   bool recently = false;
   bool any_tracked = false;
   for (std::size_t i = 0; i < tracks.size(); ++i) {
     const Track& track = tracks[i];
     const bool lost = track.frames_since_lost < kRecentFrames;
-    priorities_[i] = track.tracked ? SearchPriority::kNone
-                     : lost        ? SearchPriority::kFirst
-                                   : SearchPriority::kNormal;
+    SearchPriority& priority = priorities_[patterns[i].first];
+    if (!track.tracked)
+      priority = std::max(priority, lost ? SearchPriority::kFirst : SearchPriority::kNormal);
     missing = missing || !track.tracked;
     recently = recently || (!track.tracked && lost);
     any_tracked = any_tracked || track.tracked;
@@ -78,13 +83,14 @@ bool SearchScheduler::due(std::span<const Track> tracks, bool following) {
   return true;
 }
 
-bool SearchScheduler::start(const GrayImage& frame, FeatureExtractor& extractor) {
+bool SearchScheduler::start(const GrayImage& frame, FeatureExtractor& extractor,
+                            std::span<const KnownCopy> known) {
   if (async_ != nullptr) {
-    async_->start(frame, priorities_);
+    async_->start(frame, priorities_, known);
   } else if (sliced_ != nullptr) {
-    sliced_->start(frame, priorities_);
+    sliced_->start(frame, priorities_, known);
   } else {
-    search_->run(extractor, priorities_, candidates_);
+    search_->run(extractor, priorities_, known, candidates_);
     return true;
   }
   return false;

@@ -15,7 +15,8 @@ namespace modar::tracker {
 
 class SearchScheduler {
  public:
-  /// Searches copies of the patterns with a copy of the camera: see set_shapes().
+  /// Searches the prints among the patterns, with a copy of them and of the camera: see
+  /// set_shapes().
   SearchScheduler(const Camera& camera, std::span<const TrackedPattern> patterns,
                   const PoseLoopOptions& options);
 
@@ -27,9 +28,12 @@ class SearchScheduler {
   bool advance(std::ptrdiff_t tracked);
   /// Whether this frame is searched for the patterns that are not tracked; sets their priorities.
   /// following: extended tracking says where one of them is.
-  bool due(std::span<const Track> tracks, bool following);
-  /// Searches the frame, or starts to. True where there are candidates at once.
-  bool start(const GrayImage& frame, FeatureExtractor& extractor);
+  bool due(std::span<const TrackedPattern> patterns, std::span<const Track> tracks, bool following);
+  /// Searches the frame, or starts to. True where there are candidates at once. known: copies that
+  /// are tracked, of prints of several copies.
+  bool start(const GrayImage& frame, FeatureExtractor& extractor, std::span<const KnownCopy> known);
+  /// The next frame is searched again: it may show more copies.
+  void hurry() { frames_to_search_ = 0; }
   /// Forgets the search under way.
   void reset();
 

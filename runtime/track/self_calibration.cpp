@@ -199,9 +199,9 @@ bool SelfCalibration::apply() {
 
 void SelfCalibration::place_pictures(TrackResult& result) const {
   for (Detection& seen : result.visible) {
-    const auto which =
-        std::find_if(patterns_.begin(), patterns_.end(),
-                     [&](const TrackedPattern& pattern) { return pattern.index == seen.pattern; });
+    const auto which = std::find_if(
+        patterns_.begin(), patterns_.end(),
+        [&](const TrackedPattern& one) { return one.shown_by(seen.pattern, seen.copy); });
     if (which == patterns_.end() || !which->surface.flat()) continue;
     const auto i = static_cast<std::size_t>(which - patterns_.begin());
     const DrawnPose drawn = drawn_pose(*which, camera_, seen.pose, estimator_.aspect(i));

@@ -34,6 +34,11 @@ namespace modar::tracker {
 
 struct TrackedPattern {
   std::uint32_t index = 0;  ///< of the bundle's patterns
+  /// Copies of the print are tracked by a TrackedPattern each, over the same bytes: which of them
+  /// this is, how many there are, and the place of the first among the loop's.
+  std::uint32_t copy = 0;
+  std::uint32_t copies = 1;
+  std::uint32_t first = 0;
   std::uint32_t bright_count = 0;
   std::span<const TrackerFeatureRecord> features;
   const std::uint8_t* codes = nullptr;
@@ -48,6 +53,10 @@ struct TrackedPattern {
   glm::dmat2 shape{1.0};
 
   [[nodiscard]] int width() const { return levels[0].width; }
+  /// Whether a detection is of this copy.
+  [[nodiscard]] bool shown_by(std::uint32_t pattern, std::uint32_t its_copy) const {
+    return pattern == index && its_copy == copy;
+  }
   [[nodiscard]] int height() const { return levels[0].height; }
   /// Image pixels (centres at integers) to the pattern plane (ModAR Eq. 1), and back.
   [[nodiscard]] glm::dvec2 to_world(glm::dvec2 pixel) const;
@@ -55,6 +64,13 @@ struct TrackedPattern {
   /// Image pixels to where the pattern's surface has them: (to_world(), 0) of a flat one.
   [[nodiscard]] glm::dvec3 on_surface(glm::dvec2 pixel) const;
 };
+
+/// How many of them are no further copies; these come first.
+inline std::size_t count_of_prints(std::span<const TrackedPattern> patterns) {
+  std::size_t count = 0;
+  while (count < patterns.size() && patterns[count].copy == 0) ++count;
+  return count;
+}
 
 /// Views a section's bytes, which must outlive the pattern. Every count and offset is validated,
 /// and every feature and patch is within the image: nothing later checks again. Errors:

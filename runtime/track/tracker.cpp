@@ -58,17 +58,20 @@ constexpr int kFramesToKeep = 2;
 
 }  // namespace
 
-[[gnu::cold]] Hysteresis::Hysteresis(std::size_t pattern_count, bool predict, bool stills)
-    : counters_(pattern_count),
-      states_(pattern_count),
+[[gnu::cold]] Hysteresis::Hysteresis(std::size_t pattern_count, bool predict, bool stills,
+                                     std::size_t copies)
+    : pattern_count_(pattern_count),
+      counters_(pattern_count * copies),
+      states_(pattern_count * copies),
       predict_(predict),
       frames_to_show_(stills ? 1 : kFramesToShow) {}
 
 std::span<const Hysteresis::State> Hysteresis::step(std::span<const Detection> visible) {
   for (Counter& counter : counters_) counter.state.measured = false;
   for (const Detection& detection : visible) {
-    if (detection.pattern >= counters_.size()) continue;
-    Counter& counter = counters_[detection.pattern];
+    const std::size_t at = detection.copy * pattern_count_ + detection.pattern;
+    if (detection.pattern >= pattern_count_ || at >= counters_.size()) continue;
+    Counter& counter = counters_[at];
     counter.state.measured = true;
     counter.moving = predict_ && counter.seen > 0;
     counter.previous = counter.state.pose;

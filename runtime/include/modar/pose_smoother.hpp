@@ -20,7 +20,7 @@ class PoseSmoother {
   /// max_latency_ms: latency of a resting pattern, 0 to 1000; 0: off, poses pass unchanged. It
   /// falls as 1 / (1 + speed / 0.05), speed in radians per second: of the rotation plus of the line
   /// of sight.
-  PoseSmoother(std::size_t pattern_count, double max_latency_ms);
+  PoseSmoother(std::size_t pattern_count, double max_latency_ms, std::size_t copies = 1);
 
   /// time_s: of the frame, increasing. Changes poses, and corners and stretches alike. A pattern
   /// that was not in the last frame starts anew. Returns the largest latency, milliseconds.
@@ -39,6 +39,7 @@ class PoseSmoother {
   };
   double smooth(double time_s, State& state, Detection& detection) const;
 
+  std::size_t pattern_count_;
   std::vector<State> states_;
   double max_latency_s_ = 0;
 };

@@ -34,6 +34,7 @@ int progress(Reason reason);
 /// A pattern measured in this frame.
 struct Detection {
   std::uint32_t pattern = 0;
+  std::uint32_t copy = 0;  ///< of the print; kept while it is tracked and where it is found again
   std::array<glm::dvec2, 4>
       corners{};  ///< frame pixels: top-left, top-right, bottom-right, bottom-left; including
                   ///< hidden ones of a curved pattern; of a box those of its first face
@@ -74,9 +75,10 @@ struct CameraEstimate {
 };
 
 struct TrackResult {
-  std::vector<Detection> visible;       ///< in the order of the bundle's patterns
+  std::vector<Detection> visible;       ///< in the order of the bundle's patterns and their copies
   Reason reason = Reason::kNoFeatures;  ///< of the pattern that passed most stages
   int features = 0;                     ///< keypoints of the frame
+  std::int32_t crowded = -1;  ///< a pattern with more copies in view than are tracked; -1: none
   TrackTimes times;
   CameraEstimate camera;
 };
@@ -88,8 +90,9 @@ struct TrackResult {
 class Hysteresis {
  public:
   /// predict: false leaves the model of a lost pattern in place, as the paper does. stills: a
-  /// model is shown in the first frame that sees its pattern.
-  explicit Hysteresis(std::size_t pattern_count, bool predict = true, bool stills = false);
+  /// model is shown in the first frame that sees its pattern. copies: of each pattern.
+  explicit Hysteresis(std::size_t pattern_count, bool predict = true, bool stills = false,
+                      std::size_t copies = 1);
 
   struct State {
     bool shown = false;     ///< draw the model, at `pose`
@@ -97,7 +100,8 @@ class Hysteresis {
     Pose pose;
     glm::dmat4x3 stretch{1.0};  ///< Detection::stretch
   };
-  /// Takes a frame's detections; returns one state per pattern, valid until the next call.
+  /// Takes a frame's detections; returns one state per pattern, then those of the second copies,
+  /// and so on, valid until the next call.
   std::span<const State> step(std::span<const Detection> visible);
 
  private:
@@ -108,6 +112,7 @@ class Hysteresis {
     Pose previous;
     State state;
   };
+  std::size_t pattern_count_;
   std::vector<Counter> counters_;
   std::vector<State> states_;
   bool predict_ = true;
