@@ -112,9 +112,12 @@ void Controls::turn_model(int step) {
 std::span<const SceneCommand> Controls::act(std::span<const Hysteresis::State> states,
                                             double time_s, std::span<const SceneEvent> events) {
   events_.assign(events.begin(), events.end());
-  for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {
-    if (!wants(pattern) || !states[pattern].shown) continue;
-    events_.push_back({SceneEvent::Kind::kSeen, pattern, kNone});
+  // Copies of a pattern act as one.
+  const std::uint32_t count = bundle_.patterns().size();
+  for (std::uint32_t pattern = 0; pattern < count; ++pattern) {
+    bool shown = false;
+    for (std::size_t i = pattern; i < states.size(); i += count) shown = shown || states[i].shown;
+    if (wants(pattern) && shown) events_.push_back({SceneEvent::Kind::kSeen, pattern, kNone});
   }
   return machine_->step(time_s, events_);
 }
@@ -124,16 +127,14 @@ std::span<const SceneCommand> Controls::collect(std::span<const Hysteresis::Stat
                                                 std::vector<DrawItem>& items) {
   const auto commands = act(states, time_s, events);
   items.clear();
-  if (model_ != kNone) {
-    for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {
-      if (wants(pattern)) add_standard(states[pattern], model_, items);
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const auto pattern = static_cast<std::uint32_t>(i % bundle_.patterns().size());
+    if (!wants(pattern) || !states[i].shown) continue;
+    if (model_ != kNone) {
+      add_standard(states[i], model_, items);
+    } else {
+      machine_->add_items(pattern, gl_view(states[i].pose, states[i].stretch), items);
     }
-    return commands;
-  }
-  for (std::uint32_t pattern = 0; pattern < states.size(); ++pattern) {
-    const Hysteresis::State& state = states[pattern];
-    if (!wants(pattern) || !state.shown) continue;
-    machine_->add_items(pattern, gl_view(state.pose, state.stretch), items);
   }
   return commands;
 }

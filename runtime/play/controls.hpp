@@ -52,9 +52,9 @@ class Controls {
   void load(const BundleView& bundle);
 
   /// What to draw: each shown pattern's scenes and nodes, as its actions have left them, or the
-  /// model that the user chose for it. events: taps, and what ended. states: one a pattern, as
-  /// Hysteresis answers. items: those of the frame before, on which clicks fall. Answers what the
-  /// actions ask for. Allocates nothing once `items` has its room.
+  /// model that the user chose for it. events: taps, and what ended. states: one a pattern and
+  /// copy, as Hysteresis answers. items: those of the frame before, on which clicks fall. Answers
+  /// what the actions ask for. Allocates nothing once `items` has its room.
   std::span<const SceneCommand> collect(std::span<const Hysteresis::State> states, double time_s,
                                         std::span<const SceneEvent> events,
                                         std::vector<DrawItem>& items);

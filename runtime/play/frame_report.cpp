@@ -76,8 +76,9 @@ void homography(JsonWriter& writer, const std::array<glm::dvec2, 4>& corners) {
 }
 
 void detection(JsonWriter& writer, const Detection& seen, std::span<const std::string> names,
-               bool homographies) {
+               bool numbered, bool homographies) {
   writer.put("pattern", seen.pattern < names.size() ? std::string_view(names[seen.pattern]) : "");
+  if (numbered) writer.put("copy", seen.copy);
   writer.array("corners", [&] {
     for (const glm::dvec2& corner : seen.corners) {
       writer.array([&] {
@@ -181,7 +182,8 @@ std::string frame_line(const FrameReport& frame, std::span<const std::string> pa
     writer.put("time_s", report.time_s);
     writer.array("visible", [&] {
       for (const Detection& seen : report.visible) {
-        writer.object([&] { detection(writer, seen, pattern_names, homographies); });
+        writer.object(
+            [&] { detection(writer, seen, pattern_names, report.numbered, homographies); });
       }
     });
     writer.put("reason", to_string(report.reason));

@@ -60,6 +60,7 @@ struct FrameReport {
   double time_s = 0;
   double reduced = 1;              ///< Frame::reduced
   std::vector<Detection> visible;  ///< measured in this frame, whether shown or not
+  bool numbered = false;           ///< several copies of a pattern are tracked: theirs are told
   Reason reason = Reason::kNoFeatures;
   Shown state = Shown::kHidden;
   CameraReport camera;  ///< in pixels of the file
@@ -132,11 +133,12 @@ bool draws_in_software(std::string_view gl_renderer);
 /// {frame,time_s,visible:[{pattern,corners,rotation,translation,inliers,matches,fit,agreeing,
 /// likeness}],reason,state,camera:{focal_px,sigma_px,source},ms}; sigma_px of an estimated camera;
 /// commands where the bundle's actions ask for some, caption where something is heard;
-/// of an extended pose also extended, position_sigma, rotation_sigma. Rotation row by row; numbers
-/// that are not finite become null. No newline at the end. pattern_names: by the bundle's pattern
-/// index. homographies: adds each pattern's `homography`, row by row, from its unit square (0, 0
-/// its top left corner, 1, 1 its bottom right one) to the frame's pixels; null where its corners
-/// have none. Corners and homographies are in pixels of the file.
+/// copy where several of a pattern are tracked; of an extended pose also extended, position_sigma,
+/// rotation_sigma. Rotation row by row; numbers that are not finite become null. No newline at the
+/// end. pattern_names: by the bundle's pattern index. homographies: adds each pattern's
+/// `homography`, row by row, from its unit square (0, 0 its top left corner, 1, 1 its bottom right
+/// one) to the frame's pixels; null where its corners have none. Corners and homographies are in
+/// pixels of the file.
 std::string frame_line(const FrameReport& report, std::span<const std::string> pattern_names,
                        bool homographies = false);
 

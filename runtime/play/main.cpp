@@ -109,7 +109,7 @@ Result<int> play_video(const PlayOptions& asked, const BundleView& bundle, const
   MODAR_ASSIGN(TrackStep track,
                open_vision(bundle, {options.method == "ours", set, plan.camera, &spot,
                                     options.live ? &live : nullptr, newest, options.extended,
-                                    std::move(turns), info.stills}));
+                                    options.copies, std::move(turns), info.stills}));
 
   Player player(options, bundle);
   const std::string name(bundle.name(parameter_set(bundle, set).name));

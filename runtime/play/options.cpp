@@ -41,6 +41,11 @@ bool set_gpu_budget(PlayOptions& options, std::string_view text) {
   return options.gpu_budget > 0;
 }
 
+bool set_copies(PlayOptions& options, std::string_view text) {
+  options.copies = static_cast<int>(parse_count(text, kMostCopies));
+  return options.copies > 0;
+}
+
 struct TextOption {
   const char* name;
   std::string PlayOptions::*text;
@@ -62,12 +67,13 @@ struct ValueOption {
   bool (*set)(PlayOptions&, std::string_view);
   const char* expected;
 };
-constexpr std::array<ValueOption, 5> kValues = {{
+constexpr std::array<ValueOption, 6> kValues = {{
     {"turntable", set_turntable, "a number of frames (1 to 100000)"},
     {"size", set_size, "a size like 640x480"},
     {"tolerance", set_tolerance, "a number of pixels like 0.5"},
     {"smooth", set_smooth, "a number of milliseconds (0 to 1000)"},
     {"gpu-budget", set_gpu_budget, "an amount of memory like 64M"},
+    {"copies", set_copies, "a number of copies (1 to 16)"},
 }};
 
 struct SwitchOption {
@@ -133,6 +139,9 @@ Result<void> validate(const PlayOptions& options) {
   if (options.live &&
       !(options.golden.empty() && options.record.empty() && options.turntable == 0)) {
     return usage("usage.conflict", "--live", "recordings and turntables are of one bundle");
+  }
+  if (options.copies > 1 && !(options.golden.empty() && options.record.empty())) {
+    return usage("usage.conflict", "--copies", "recordings are of one copy of each pattern");
   }
   if (!options.gyro.empty() && !options.extended) {
     return usage("usage.conflict", "--gyro", "it has no effect without --extended");
@@ -202,6 +211,7 @@ Tracking:
                       also modar calibrate)
   --extended          learn the static surroundings of a pattern, and continue while the
                       pattern is covered or out of view
+  --copies N          track up to N copies of each pattern, each with its content (default: 1)
   --smooth MS         steady models at rest, which may lag by this much (default: 0, off)
   --outline           draw the outline of each visible pattern (amber while it is extended), the
                       default if no pattern has content

@@ -13,6 +13,9 @@ namespace modar {
 /// Beyond ExitCode: --golden ran and found another result than the recording's.
 inline constexpr int kExitDifferent = 10;
 
+/// Of --copies; more are rarely in one view.
+inline constexpr int kMostCopies = 16;
+
 struct PlayOptions {
   std::string bundle;
   std::string input;   ///< path, "camera" or "camera:N"
@@ -29,6 +32,7 @@ struct PlayOptions {
   double tolerance = 0.5;        ///< pixels; of --golden
   double smooth_ms = 0;          ///< latency that smoothing may add; 0: off
   std::uint64_t gpu_budget = 0;  ///< bytes; 0: the device's
+  int copies = 1;                ///< of each pattern that are tracked, at most
   int turntable = 0;             ///< frames of a turn; 0: no turntable
   int width = 640;               ///< of turntable pictures
   int height = 480;

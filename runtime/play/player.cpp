@@ -84,12 +84,17 @@ Player::Player(const PlayOptions& options, const BundleView& bundle)
       watch_(options.bundle),
       names_(pattern_names(bundle)),
       hysteresis_(names_.size()),
-      smoother_(names_.size(), options.smooth_ms),
+      smoother_(names_.size(), 0),
       controls_(bundle, options.outline || is_bare(bundle), options.osd || options.window),
       progress_(!options.quiet) {
   if (options.sound) controls_.apply({Act::kSound});
+  reserve_items();
+}
+
+void Player::reserve_items() {
   items_.reserve(
-      std::max(bundle.scenes().size() + bundle.nodes().size(), bundle.patterns().size()));
+      static_cast<std::size_t>(options_.copies) *
+      std::max(bundle_.scenes().size() + bundle_.nodes().size(), bundle_.patterns().size()));
 }
 
 Result<void> Player::open(const PlayerSetup& setup) {
@@ -112,8 +117,9 @@ Result<void> Player::open(const PlayerSetup& setup) {
 
 /// Nothing of the frames before shows any more.
 void Player::restart_scene() {
-  hysteresis_ = Hysteresis(names_.size(), options_.method != "paper", setup_.source.stills);
-  smoother_ = PoseSmoother(names_.size(), options_.smooth_ms);
+  const auto copies = static_cast<std::size_t>(options_.copies);
+  hysteresis_ = Hysteresis(names_.size(), options_.method != "paper", setup_.source.stills, copies);
+  smoother_ = PoseSmoother(names_.size(), options_.smooth_ms, copies);
 }
 
 /// Sound fits only frames that come at their own time.
@@ -208,8 +214,7 @@ Result<void> Player::follow_live(const Job& job) {
   bundle_ = live_->view;
   controls_.load(bundle_);
   open_media();
-  items_.reserve(
-      std::max(bundle_.scenes().size() + bundle_.nodes().size(), bundle_.patterns().size()));
+  reserve_items();
   std::vector<std::string> names = pattern_names(bundle_);
   if (!spot_ && names != names_) {
     names_ = std::move(names);
@@ -233,6 +238,8 @@ FrameReport Player::begin_report(const Job& job) {
     if (spot_ || controls_.wants(seen.pattern)) report.visible.push_back(seen);
   }
   report.reason = job.track.reason;
+  report.numbered = options_.copies > 1;
+  if (job.track.crowded >= 0) tell_of_copies(static_cast<std::size_t>(job.track.crowded));
   report.camera = {job.track.camera, setup_.camera.fx > 0};
   report.camera.focal.focal = job.camera.fx * job.frame.reduced;
   report.camera.focal.sigma *= job.frame.reduced;
@@ -259,6 +266,15 @@ FrameReport Player::begin_report(const Job& job) {
     if (report.state == Shown::kHidden) report.state = Shown::kHeld;
   }
   return report;
+}
+
+/// Once a run: more copies of a pattern are in view than are tracked.
+void Player::tell_of_copies(std::size_t pattern) {
+  if (options_.quiet || std::exchange(told_of_copies_, true)) return;
+  progress_.end();
+  std::fprintf(stderr,
+               "modar-play: more than %d of '%s' in view; --copies N tracks so many of a pattern\n",
+               options_.copies, pattern < names_.size() ? names_[pattern].c_str() : "");
 }
 
 /// The content of the patterns after the actions; clicks hit the previous drawing.

@@ -76,6 +76,8 @@ class Player {
   void collect(std::span<const Hysteresis::State> states, const Job& job, FrameReport& report);
   void open_media();
   void restart_scene();
+  void reserve_items();
+  void tell_of_copies(std::size_t pattern);
   void outline(const Canvas& canvas, const Camera& camera, const Detection& seen,
                Colour colour) const;
   void draw(const Job& job, const FrameReport& report);
@@ -112,6 +114,7 @@ class Player {
   std::optional<GoldenCheck> golden_;
   std::optional<QosLog> qos_;
   std::vector<DrawItem> items_;
+  bool told_of_copies_ = false;
   std::shared_ptr<const SpotPattern> spot_;  ///< the one that names_ and hysteresis_ are about
 };
 

@@ -24,6 +24,7 @@ struct OurVision {
     PoseLoopOptions how;
     how.async_search = options.apart;
     how.extended = options.extended;
+    how.max_instances = options.copies;
     how.estimate_camera = !options.camera;
     return how;
   }

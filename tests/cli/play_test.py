@@ -124,6 +124,31 @@ class Play(ProgramTest):
             red, green, blue = picture.pixels[at:at + 3]
             self.assertGreater(green, 80 + max(red, blue), f"the middle of a side, {corners}")
 
+    def test_copies_of_a_print_are_reported_and_tracked(self):
+        done = self.modar("bake", "--pattern", COVER, "-o", "bare.modar", "--quiet", "--parameters", "none", *QUICK)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        sys.path.insert(0, str(ROOT / "assets"))
+        from kit import png
+        cover = png.read(COVER)
+        wide, high, channels = 3 * cover.width, 2 * cover.height, len(cover.pixels) // (cover.width * cover.height)
+        pixels = bytearray(b"\x80" * (wide * high * channels))
+        lefts = (cover.width // 4, 7 * cover.width // 4)
+        for left in lefts:
+            for row in range(cover.height):
+                to = ((row + cover.height // 2) * wide + left) * channels
+                line = cover.width * channels
+                pixels[to:to + line] = cover.pixels[row * line:(row + 1) * line]
+        png.write(self.folder / "two.png", png.Picture(wide, high, bytes(pixels)))
+        one = self.play("bare.modar", "--input", "two.png", "--json")
+        self.assertEqual(len(lines_of(one)[0]["visible"]), 1)
+        self.assertEqual(one.stderr.count("more than 1 of 'cover' in view"), 1, one.stderr)
+        two = self.play("bare.modar", "--input", "two.png", "--json", "--copies", "3")
+        self.assertNotIn("in view", two.stderr)
+        seen = lines_of(two)[0]["visible"]
+        self.assertEqual([each["copy"] for each in seen], [0, 1])
+        for left, x in zip(lefts, sorted(each["corners"][0][0] for each in seen)):
+            self.assertAlmostEqual(x, left, delta=2)
+
     def test_a_bundle_that_is_replaced_is_played_on(self):
         bundle = self.bake_demo()
         sys.path.insert(0, str(ROOT / "assets"))

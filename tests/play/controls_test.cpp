@@ -84,6 +84,22 @@ TEST_F(ControlsTest, WithoutKeysTheScenesAreDrawn) {
   EXPECT_EQ(models(controls), (Models{2}));
 }
 
+TEST_F(ControlsTest, EachCopyOfAPatternHasItsContent) {
+  Controls controls(view_, false, false);
+  std::array<Hysteresis::State, 4> states{};  // p, q, and the second copies of both
+  states[0].shown = states[2].shown = true;
+  states[2].pose.translation = {1, 2, 6};
+  std::vector<DrawItem> items;
+  controls.collect(states, 0.0, {}, items);
+  ASSERT_EQ(items.size(), 2u);
+  EXPECT_EQ(items[0].model, 1u);
+  EXPECT_EQ(items[1].model, 1u);
+  EXPECT_EQ(items[1].world_to_eye[3], (glm::vec4{1, -2, -6, 1}));  // GL looks along -z
+  states[0].shown = false;
+  controls.collect(states, 0.1, {}, items);
+  EXPECT_EQ(items.size(), 1u);
+}
+
 TEST_F(ControlsTest, ModelsComeInTurnAndTheScenesAfterTheLast) {
   Controls controls(view_, false, false);
   controls.apply({Act::kNextModel, {}});

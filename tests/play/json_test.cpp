@@ -87,6 +87,14 @@ TEST(JsonLines, WhatThePoseDoesNotExplainIsWrittenByRows) {
             json({1.0, 0.25, 0.0, 1.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0}));
 }
 
+TEST(JsonLines, CopiesAreNumberedWhereSeveralAreTracked) {
+  FrameReport report = seen_frame();
+  report.visible[0].copy = 3;
+  EXPECT_FALSE(json::parse(frame_line(report, {}))["visible"][0].contains("copy"));
+  report.numbered = true;
+  EXPECT_EQ(json::parse(frame_line(report, {}))["visible"][0]["copy"], 3);
+}
+
 TEST(JsonLines, AnExtendedPoseSaysSo) {
   FrameReport report = seen_frame();
   EXPECT_FALSE(json::parse(frame_line(report, {}))["visible"][0].contains("extended"));

@@ -64,6 +64,16 @@ TEST(Options, AGyroscopeHelpsExtendedPosesOnly) {
   EXPECT_EQ(code_of({"a.modar", "--input", "v", "--gyro", "turns.txt"}), "usage.conflict");
 }
 
+TEST(Options, CopiesAreOneToSixteenAndNotRecorded) {
+  EXPECT_EQ(parse({"a.modar", "--input", "v"})->copies, 1);
+  EXPECT_EQ(parse({"a.modar", "--input", "v", "--copies", "16"})->copies, 16);
+  for (const char* bad : {"0", "17", "-1", "two"}) {
+    EXPECT_EQ(code_of({"a.modar", "--input", "v", "--copies", bad}), "usage.value") << bad;
+  }
+  EXPECT_EQ(code_of({"a.modar", "--input", "v", "--copies", "2", "--record", "r"}),
+            "usage.conflict");
+}
+
 TEST(Options, TurntableNeedsAPlaceAndNoInput) {
   const auto options = parse({"a.modar", "--turntable", "12", "--out", "d", "--size", "320x200"});
   ASSERT_TRUE(options);

@@ -42,6 +42,19 @@ TEST(Hysteresis, WithoutPredictionKeepsTheNewestPoseAndSaysWhetherItIsOfThisFram
   EXPECT_EQ(states[1].pose.translation, glm::dvec3(4, 5, 6));
 }
 
+TEST(Hysteresis, CopiesOfAPatternAreApart) {
+  Hysteresis hysteresis(2, true, true, 3);
+  std::array<Detection, 2> seen;
+  seen[0].pattern = 1;
+  seen[1].pattern = 1;
+  seen[1].copy = 2;
+  seen[1].pose.translation = {7, 8, 9};
+  const auto states = hysteresis.step(seen);
+  ASSERT_EQ(states.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(states[i].shown, i == 1 || i == 5) << i;
+  EXPECT_EQ(states[5].pose.translation, glm::dvec3(7, 8, 9));
+}
+
 TEST(Hysteresis, GoesOnAsThePatternMovedBeforeItsLoss) {
   Hysteresis hysteresis(1);
   Detection detection;
