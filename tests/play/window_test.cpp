@@ -11,6 +11,7 @@
 
 #include "formats/bundle_writer.hpp"
 #include "modar/gl_context.hpp"
+#include "runtime/play/frame_source.hpp"
 
 namespace modar {
 namespace {
