@@ -27,7 +27,7 @@ MODAR_ENDS_WITH(modar_scene, reserved);
 MODAR_ENDS_WITH(modar_camera, distortion);
 MODAR_ENDS_WITH(modar_picture, chroma_step);
 MODAR_ENDS_WITH(modar_pose, reserved);
-MODAR_ENDS_WITH(modar_tracker_options, reserved);
+MODAR_ENDS_WITH(modar_tracker_options, max_instances);
 MODAR_ENDS_WITH(modar_turntable, zoom);
 MODAR_ENDS_WITH(modar_item, bones);
 MODAR_ENDS_WITH(modar_clip, seconds);

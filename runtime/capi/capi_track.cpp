@@ -32,7 +32,8 @@ struct modar_tracker {
   double smooth_ms = 0;
   double time_s = 0;
   modar::TrackResult result;
-  std::vector<modar_pose> poses;  ///< one a pattern
+  std::size_t patterns = 0;
+  std::vector<modar_pose> poses;  ///< one a pattern, then those of their second copies, and so on
 };
 
 namespace {
@@ -74,29 +75,33 @@ modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_came
   how.budget = asked.budget;
   how.extended = asked.extended != 0;
   how.estimate_camera = asked.estimate_camera != 0;
+  how.max_instances = std::clamp(asked.max_instances, 1, modar::kMostCopies);
   auto loop = modar::PoseLoop::create(bundle->view, ours, how);
   if (!loop) return modar::fail_null(loop.error(), error);
   const std::size_t patterns = bundle->view.patterns().size();
   const double smooth_ms = std::clamp(asked.smooth_ms, 0.0, 1000.0);
+  const auto copies = static_cast<std::size_t>(how.max_instances);
   return new modar_tracker{bundle,
                            how,
                            ours,
                            {},
                            std::move(*loop),
-                           modar::Hysteresis(patterns),
-                           modar::PoseSmoother(patterns, smooth_ms),
+                           modar::Hysteresis(patterns, true, false, copies),
+                           modar::PoseSmoother(patterns, smooth_ms, copies),
                            smooth_ms,
                            0,
                            {},
-                           std::vector<modar_pose>(patterns)};
+                           patterns,
+                           std::vector<modar_pose>(patterns * copies)};
 }
 
 void modar_tracker_reset(modar_tracker* tracker) {
   if (tracker == nullptr) return;
   tracker->loop->reset();
-  tracker->hysteresis = modar::Hysteresis(tracker->poses.size());
-  tracker->smoother = modar::PoseSmoother(tracker->poses.size(), tracker->smooth_ms);
-  tracker->poses.assign(tracker->poses.size(), modar_pose{});
+  const auto copies = static_cast<std::size_t>(tracker->options.max_instances);
+  tracker->hysteresis = modar::Hysteresis(tracker->patterns, true, false, copies);
+  tracker->smoother = modar::PoseSmoother(tracker->patterns, tracker->smooth_ms, copies);
+  tracker->poses.assign(tracker->patterns * copies, modar_pose{});
 }
 
 int modar_tracker_add_pattern(modar_tracker* tracker, const modar_record* record, uint32_t* pattern,
@@ -117,8 +122,8 @@ int modar_tracker_add_pattern(modar_tracker* tracker, const modar_record* record
   tracker->camera = camera;
   tracker->loop = std::move(*loop);
   tracker->own = std::move(own);
-  if (pattern != nullptr) *pattern = static_cast<std::uint32_t>(tracker->poses.size());
-  tracker->poses.emplace_back();
+  if (pattern != nullptr) *pattern = static_cast<std::uint32_t>(tracker->patterns);
+  ++tracker->patterns;
   modar_tracker_reset(tracker);
   return MODAR_OK;
 }
@@ -164,7 +169,7 @@ int modar_tracker_step(modar_tracker* tracker, const uint8_t* gray, size_t strid
     if (states[i].shown) set_pose(states[i].pose, states[i].stretch, pose);
   }
   for (const modar::Detection& seen : tracker->result.visible) {
-    modar_pose& pose = tracker->poses[seen.pattern];
+    modar_pose& pose = tracker->poses[seen.copy * tracker->patterns + seen.pattern];
     set_pose(seen.pose, seen.stretch, pose);
     pose.visible = 1;
     pose.inliers = seen.inliers;
@@ -191,9 +196,22 @@ void modar_tracker_turn(modar_tracker* tracker, const double rotation[3]) {
 }
 
 int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pose* pose) {
-  if (tracker == nullptr || pattern >= tracker->poses.size()) return 0;
-  modar::give(tracker->poses[pattern], pose);
-  return tracker->poses[pattern].visible;
+  return modar_tracker_copy(tracker, pattern, 0, pose);
+}
+
+int modar_tracker_copy(const modar_tracker* tracker, uint32_t pattern, uint32_t copy,
+                       modar_pose* pose) {
+  if (tracker == nullptr || pattern >= tracker->patterns ||
+      copy >= tracker->poses.size() / tracker->patterns) {
+    return 0;
+  }
+  const modar_pose& known = tracker->poses[copy * tracker->patterns + pattern];
+  modar::give(known, pose);
+  return known.visible;
+}
+
+int modar_tracker_crowded(const modar_tracker* tracker) {
+  return tracker == nullptr ? -1 : tracker->result.crowded;
 }
 
 double modar_tracker_camera(const modar_tracker* tracker, modar_camera* camera) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "decimal.hpp"
+#include "modar/pose_loop.hpp"
 #include "runtime/platform/command_line.hpp"
 
 namespace modar {

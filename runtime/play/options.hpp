@@ -13,9 +13,6 @@ namespace modar {
 /// Beyond ExitCode: --golden ran and found another result than the recording's.
 inline constexpr int kExitDifferent = 10;
 
-/// Of --copies; more are rarely in one view.
-inline constexpr int kMostCopies = 16;
-
 struct PlayOptions {
   std::string bundle;
   std::string input;   ///< path, "camera" or "camera:N"

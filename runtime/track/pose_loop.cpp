@@ -191,7 +191,6 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
 
 /// Further copies follow the prints, so that those are numbered as if there were none.
 [[gnu::cold]] void PoseLoop::State::add_copies() {
-  constexpr int kMostCopies = 16;
   const auto copies = static_cast<std::uint32_t>(std::clamp(options.max_instances, 1, kMostCopies));
   const std::size_t prints = patterns.size();
   for (std::size_t i = 0; i < prints; ++i) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "bake/pattern/pattern.hpp"
+#include "modar/modar.h"
 #include "modar/pose_loop.hpp"
 #include "tests/track/pose_loop_samples.hpp"
 
@@ -173,6 +174,38 @@ TEST(PoseLoopCopiesMoving, OneMoreThanMayBeTrackedIsReported) {
     EXPECT_EQ(result.crowded, 0) << copies;
     EXPECT_EQ(result.visible.size(), static_cast<std::size_t>(copies));
   }
+}
+
+TEST(PoseLoopCopiesMoving, TheCApiTellsThePoseOfEachCopy) {
+  modar_bundle* const bundle =
+      modar_bundle_open_bytes(bundle_of_one().data(), bundle_of_one().size(), nullptr);
+  auto camera = sized<modar_camera>();
+  modar_camera_default(kWidth, kHeight, &camera);
+  const CopiesFrame frame(places(3, 0));
+  for (const int most : {0, 2, 4}) {
+    auto options = sized<modar_tracker_options>();
+    options.max_instances = most;
+    modar_tracker* const tracker = modar_tracker_create(bundle, &camera, &options, nullptr);
+    for (int time = 0; time < 2; ++time) {
+      ASSERT_EQ(modar_tracker_step(tracker, frame.picture.pixels.data(), kWidth, -1, nullptr), 0);
+      if (time == 0) EXPECT_EQ(modar_tracker_crowded(tracker), most < 3 ? 0 : -1);
+    }
+    int shown = 0;
+    for (std::uint32_t copy = 0; copy < 5; ++copy) {
+      auto pose = sized<modar_pose>();
+      if (modar_tracker_copy(tracker, 0, copy, &pose) == 0) continue;
+      shown += pose.shown;
+      auto first = sized<modar_pose>();
+      modar_tracker_pose(tracker, 0, &first);
+      EXPECT_EQ(first.corners[0] == pose.corners[0], copy == 0);
+    }
+    EXPECT_EQ(shown, std::clamp(most, 1, 3));
+    EXPECT_EQ(modar_tracker_copy(tracker, 1, 0, nullptr), 0);
+    modar_tracker_destroy(tracker);
+  }
+  EXPECT_EQ(modar_tracker_copy(nullptr, 0, 0, nullptr), 0);
+  EXPECT_EQ(modar_tracker_crowded(nullptr), -1);
+  modar_bundle_close(bundle);
 }
 
 }  // namespace

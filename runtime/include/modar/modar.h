@@ -239,7 +239,8 @@ typedef struct modar_tracker_options {
   /* 1: the camera is a guess (modar_camera_default()): estimate its focal length and the aspects of
    * flat patterns from the frames; see modar_tracker_camera(). */
   int estimate_camera;
-  int reserved;
+  int max_instances; /* copies of one pattern that are tracked at once, each with its pose: 1 to 16;
+                        0: 1. See modar_tracker_copy() */
 } modar_tracker_options;
 /* options: NULL: all 0. Returns NULL and an error if no pattern of the bundle can be tracked. */
 modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_camera* camera,
@@ -267,6 +268,13 @@ MODAR_EXPERIMENTAL double modar_brightness(const uint8_t* gray, size_t stride, i
 MODAR_EXPERIMENTAL void modar_tracker_turn(modar_tracker* tracker, const double rotation[3]);
 /* The pose of a pattern in the newest frame; returns its flag `visible`. */
 int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pose* pose);
+/* The same of one of its copies, 0 to max_instances - 1. A copy keeps its number while it is
+ * tracked, and where it is found again. Copy 0 is what modar_tracker_pose() tells. */
+MODAR_EXPERIMENTAL int modar_tracker_copy(const modar_tracker* tracker, uint32_t pattern,
+                                          uint32_t copy, modar_pose* pose);
+/* A pattern of which the newest frame shows more copies than max_instances; -1: none. Known in
+ * frames that are searched. */
+MODAR_EXPERIMENTAL int modar_tracker_crowded(const modar_tracker* tracker);
 /* The camera with which the newest frame's poses were measured; draw with it. Returns the standard
  * deviation of its focal length in pixels if that is estimated, else 0. */
 double modar_tracker_camera(const modar_tracker* tracker, modar_camera* camera);

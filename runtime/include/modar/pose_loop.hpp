@@ -20,6 +20,9 @@
 
 namespace modar {
 
+/// Of PoseLoopOptions::max_instances; more are rarely in one view.
+inline constexpr int kMostCopies = 16;
+
 struct PoseLoopOptions {
   DetectOptions detect;
   bool track = true;  ///< false: search every frame
