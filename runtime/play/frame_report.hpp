@@ -60,7 +60,7 @@ struct FrameReport {
   double time_s = 0;
   double reduced = 1;              ///< Frame::reduced
   std::vector<Detection> visible;  ///< measured in this frame, whether shown or not
-  bool numbered = false;           ///< several copies of a pattern are tracked: theirs are told
+  bool numbered = false;           ///< several copies of a pattern are tracked
   Reason reason = Reason::kNoFeatures;
   Shown state = Shown::kHidden;
   CameraReport camera;  ///< in pixels of the file

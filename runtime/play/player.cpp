@@ -272,8 +272,7 @@ FrameReport Player::begin_report(const Job& job) {
 void Player::tell_of_copies(std::size_t pattern) {
   if (options_.quiet || std::exchange(told_of_copies_, true)) return;
   progress_.end();
-  std::fprintf(stderr,
-               "modar-play: more than %d of '%s' in view; --copies N tracks so many of a pattern\n",
+  std::fprintf(stderr, "modar-play: more than %d of '%s' in view; --copies N tracks more\n",
                options_.copies, pattern < names_.size() ? names_[pattern].c_str() : "");
 }
 

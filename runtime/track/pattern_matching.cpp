@@ -337,7 +337,7 @@ std::size_t PlaneMatcher::fit(const FeatureMatch& hypothesis, glm::dmat3& homogr
 
 void PlaneMatcher::forget(const PlaneMap& map) {
   // Pixels of a feature's level by which a copy's features may be off it. Higher hides copies that
-  // lie close on each other. Not swept.
+  // overlap it. Not swept.
   constexpr double kExplained = 12.0;
   std::erase_if(matches_, [&](const FeatureMatch& match) {
     bool in_front = false;

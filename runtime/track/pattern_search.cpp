@@ -359,14 +359,14 @@ void PatternSearch::conclude(const TrackedPattern& pattern, const FrameView& fra
   }
   if (candidate.reason == Reason::kVisible && bent(pattern)) candidate.reason = Reason::kCurved;
   found_ = found_ || candidate.reason == Reason::kVisible;
-  if (candidate.reason == Reason::kVisible && go_on_with_copies(pattern, frame)) return;
+  if (candidate.reason == Reason::kVisible && search_next_copy(pattern, frame)) return;
   ++at_;
   next_feature_ = 0;
   features_ = Features::kHalf;
 }
 
-/// A copy was found: whether the search goes on for another one, among the other matches.
-bool PatternSearch::go_on_with_copies(const TrackedPattern& pattern, const FrameView& frame) {
+/// A copy was found: whether the search continues for another one, among the other matches.
+bool PatternSearch::search_next_copy(const TrackedPattern& pattern, const FrameView& frame) {
   const std::uint32_t which = selected_[at_];
   const auto known = std::count_if(known_.begin(), known_.end(),
                                    [&](const KnownCopy& copy) { return copy.pattern == which; });

@@ -101,7 +101,7 @@ class PatternSearch {
   void start_hypothesis(const TrackedPattern& pattern, const FrameView& frame);
   void after_start();
   void conclude(const TrackedPattern& pattern, const FrameView& frame);
-  bool go_on_with_copies(const TrackedPattern& pattern, const FrameView& frame);
+  bool search_next_copy(const TrackedPattern& pattern, const FrameView& frame);
   [[nodiscard]] bool shows_another(const TrackedPattern& pattern, const FrameView& frame) const;
   [[nodiscard]] bool is_known(const std::array<glm::dvec2, 4>& place) const;
   void next_hypothesis();

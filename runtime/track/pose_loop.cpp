@@ -189,7 +189,7 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
             });
 }
 
-/// Further copies follow the prints, so that those are numbered as if there were none.
+/// Further copies follow the prints, which keep their numbers.
 [[gnu::cold]] void PoseLoop::State::add_copies() {
   const auto copies = static_cast<std::uint32_t>(std::clamp(options.max_instances, 1, kMostCopies));
   const std::size_t prints = patterns.size();
@@ -224,7 +224,7 @@ void PoseLoop::State::list_known() {
 }
 
 /// The copy of a print that is not tracked and was seen last most like this, so that it keeps its
-/// number; patterns.size() if all are tracked. candidate: null: the first of them.
+/// number; patterns.size() if all are tracked. Without a pose: the first of them.
 std::size_t PoseLoop::State::place_for(std::size_t print, const Pose* pose) const {
   // Share of the frame's width by which a copy may have moved to count as one that was lost.
   constexpr double kNear = 0.25;
@@ -252,8 +252,7 @@ std::size_t PoseLoop::State::place_for(std::size_t print, const Pose* pose) cons
 /// A copy that another one covers is soon drawn to it: drops the one of the two that jumped. False
 /// if it is this one.
 bool PoseLoop::State::drop_double(std::size_t i, const Detection& detection, TrackResult& result) {
-  // Share of the diagonal within which two outlines are the same. Higher drops copies that lie
-  // close on each other.
+  // Share of the diagonal within which two outlines are the same. Higher drops copies that overlap.
   constexpr double kSame = 0.1;
   const double limit = kSame * glm::length(detection.corners[2] - detection.corners[0]);
   for (std::size_t k = patterns[i].first; k < i; ++k) {

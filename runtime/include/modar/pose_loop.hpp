@@ -42,8 +42,8 @@ struct PoseLoopOptions {
   /// the pattern is covered or out of the frame: Detection::extended. Takes about 0.4 MB. The
   /// camera must move beforehand: depth comes from motion.
   bool extended = false;
-  /// Copies of one print that are tracked at once, each with its own pose: 1 to 16. Searches go on
-  /// until so many are found.
+  /// Copies of one print that are tracked at once, each with its own pose: 1 to 16. Searches
+  /// continue until all of them are found.
   int max_instances = 1;
   /// The camera is a guess: its focal length and the aspects of flat patterns are estimated from
   /// the frames (TrackResult::camera), and no print is hidden for being curved, since a wrong
