@@ -161,6 +161,8 @@ if [ -n "${budget:-}" ]; then
   measure track_default_camera track-default "$build/demo.modar" 30 4
   measure search_default_camera search-default "$build/demo.modar" 7 3
   measure track_640x480 track "$build/demo.modar" 30 4
+  # Four copies of the pattern are tracked, each half as wide.
+  measure track_4_copies copies "$build/demo.modar" 30 4
   measure search_640x480 search "$build/demo.modar" 7 3
   measure clutter_640x480 clutter "$build/demo.modar" 7 3
   # Searched and found in slices, then tracked, within PoseLoopOptions::budget of 12 million a frame.

@@ -376,14 +376,8 @@ bool PatternSearch::search_next_copy(const TrackedPattern& pattern, const FrameV
     return false;
   }
   const DetectionCandidate& found = candidates_->patterns[which];
-  KnownCopy copy{
-      which, found.homography_only ? found.map : map_of_pose(pattern, camera_, found.pose), {}};
-  std::array<glm::dvec2, 4> corners{};
-  if (found.homography_only ? !map_corners(pattern, copy.map, corners)
-                            : !locate_corners(pattern, copy.map, corners)) {
-    return false;
-  }
-  copy.place = pattern.surface.flat() ? corners : claimed_place(pattern, copy.map, corners);
+  KnownCopy copy{which,
+                 found.homography_only ? found.map : map_of_pose(pattern, camera_, found.pose)};
   copy.map.lens = nullptr;
   known_.push_back(copy);
   candidates_->copies.emplace_back(which, found);
@@ -406,18 +400,11 @@ bool PatternSearch::shows_another(const TrackedPattern& pattern, const FrameView
     const PlaneMap map{each.homography, distorting_lens(camera_)};
     std::array<glm::dvec2, 4> corners;
     if (map_corners(pattern, map, corners) && plausible(corners) && !same_place(found, corners) &&
-        !is_known(corners) && map_photometric_percent(pattern, frame, map) > 0) {
+        map_photometric_percent(pattern, frame, map) > 0) {
       return true;
     }
   }
   return false;
-}
-
-/// Whether a known copy of the pattern takes that place.
-bool PatternSearch::is_known(const std::array<glm::dvec2, 4>& place) const {
-  return std::any_of(known_.begin(), known_.end(), [&](const KnownCopy& copy) {
-    return copy.pattern == selected_[at_] && same_place(copy.place, place);
-  });
 }
 
 /// Continues the next hypothesis if it may exceed the best so far.
@@ -532,12 +519,6 @@ void PatternSearch::consider(const TrackedPattern& pattern, const FrameView& fra
       !locate_corners(pattern, map_of_pose(pattern, camera_, one.pose), corners)) {
     return;
   }
-  if (!known_.empty() &&
-      is_known(pattern.surface.flat()
-                   ? corners
-                   : claimed_place(pattern, map_of_pose(pattern, camera_, one.pose), corners))) {
-    return;
-  }
   best_ = one;
   best_hypothesis_ = hypothesis_;
   DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
@@ -582,7 +563,6 @@ void PatternSearch::find_map(const TrackedPattern& pattern, const FrameView& fra
   std::array<glm::dvec2, 4> corners;
   const auto pose = nearest_pose(pattern, camera_, map);
   if (!pose || !map_corners(pattern, map, corners) || !plausible(corners)) return;
-  if (is_known(corners)) return;
   candidate = {Reason::kVisible, *pose, true, map, false, candidate.matches, hypothesis.inliers};
 }
 

@@ -44,7 +44,6 @@ struct DetectionCandidate {
 struct KnownCopy {
   std::uint32_t pattern = 0;
   PlaneMap map;  ///< to undistorted frame pixels
-  std::array<glm::dvec2, 4> place{};
 };
 
 struct DetectionCandidates {
@@ -103,7 +102,6 @@ class PatternSearch {
   void conclude(const TrackedPattern& pattern, const FrameView& frame);
   bool search_next_copy(const TrackedPattern& pattern, const FrameView& frame);
   [[nodiscard]] bool shows_another(const TrackedPattern& pattern, const FrameView& frame) const;
-  [[nodiscard]] bool is_known(const std::array<glm::dvec2, 4>& place) const;
   void next_hypothesis();
   [[nodiscard]] std::int64_t cost_of_step() const;
   /// A refined pose and the evidence for it.

@@ -208,18 +208,13 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
 void PoseLoop::State::list_known() {
   known.clear();
   for (std::size_t i = 0; i < tracks.size(); ++i) {
-    Detection detection;
-    if (patterns[i].copies == 1 || !tracks[i].tracked ||
-        !frame_tracker.locate(patterns[i], tracks[i], detection)) {
-      continue;
-    }
+    if (patterns[i].copies == 1 || !tracks[i].tracked) continue;
     tracker::KnownCopy& copy = known.emplace_back();
     copy.pattern = patterns[i].first;
     copy.map = tracks[i].homography_only
                    ? tracks[i].map
                    : tracker::map_of_pose(patterns[i], camera, tracks[i].pose);
     copy.map.lens = nullptr;
-    copy.place = frame_tracker.place(patterns[i], tracks[i], detection);
   }
 }
 
@@ -483,7 +478,6 @@ void PoseLoop::State::accept(std::size_t print, const DetectionCandidate& candid
     if (resolve_overlap(i, detection, result)) {
       if (!track.verified) verification.reason = before.last_reason;
       show(i, verification, detection, result);
-      if (patterns[i].copies > 1) search->hurry();
       return;
     }
     reason = Reason::kOtherPrint;

@@ -32,8 +32,6 @@ class SearchScheduler {
   /// Searches the frame, or starts to. True where there are candidates at once. known: copies that
   /// are tracked, of prints of several copies.
   bool start(const GrayImage& frame, FeatureExtractor& extractor, std::span<const KnownCopy> known);
-  /// The next frame is searched again: it may show more copies.
-  void hurry() { frames_to_search_ = 0; }
   /// Forgets the search under way.
   void reset();
 

@@ -1,13 +1,13 @@
 // What scripts/foreign.sh budget counts the instructions of, under qemu with a counting plugin:
 // each measured step is between two writes to stdout. Frames are rendered from the bundle's own
 // pattern, so that nothing but the bundle is needed.
-// Usage: budget_probe track|search|clutter|sliced|extended|render|clips|open|memory BUNDLE [WIDTH
-// HEIGHT [FRAMES [BUDGET]]] search: frames that show the pattern; clutter: frames without it;
-// sliced: both, within a budget of some million instructions a frame; extended: before a wall,
-// which alone the last quarter of the frames shows; render: by null_gl.cpp; memory: tracks and
-// draws, and prints what memory the process holds after each stage; clips: two clips of 60 bones
-// blend, of a bundle of its own. track-default, search-default:
-// while the camera is a guess, as apps have it that give none.
+// Usage: budget_probe track|copies|search|clutter|sliced|extended|render|clips|open|memory BUNDLE
+// [WIDTH HEIGHT [FRAMES [BUDGET]]] copies: four of the pattern are tracked; search: frames that
+// show the pattern; clutter: frames without it; sliced: both, within a budget of some million
+// instructions a frame; extended: before a wall, which alone the last quarter of the frames shows;
+// render: by null_gl.cpp; memory: tracks and draws, and prints what memory the process holds after
+// each stage; clips: two clips of 60 bones blend, of a bundle of its own. track-default,
+// search-default: while the camera is a guess, as apps have it that give none.
 #include <unistd.h>
 
 #include <algorithm>
@@ -80,9 +80,10 @@ Frame clutter(int width, int height, std::uint32_t seed) {
   return frame;
 }
 
-/// The pattern's image at a pose, over a background, with noise of three gray values.
+/// The pattern's image at a pose, over a background, with noise of three gray values if it is the
+/// last of the frame.
 void draw(const GrayImage& pattern, const Camera& camera, const Pose& pose, Numbers& numbers,
-          Frame& frame) {
+          Frame& frame, bool last = true) {
   const double longest = std::max(pattern.width, pattern.height);
   for (int y = 0; y < frame.height; ++y) {
     for (int x = 0; x < frame.width; ++x) {
@@ -103,7 +104,7 @@ void draw(const GrayImage& pattern, const Camera& camera, const Pose& pose, Numb
             p[pattern.stride] + (u - column) * (p[pattern.stride + 1] - p[pattern.stride]);
         gray = top + (v - row) * (bottom - top);
       }
-      const int noise = numbers.next(5) + numbers.next(5) + numbers.next(5) - 6;
+      const int noise = last ? numbers.next(5) + numbers.next(5) + numbers.next(5) - 6 : 0;
       out = static_cast<std::uint8_t>(std::clamp(gray + noise, 0.0, 255.0));
     }
   }
@@ -119,6 +120,12 @@ Pose pose_at(double time) {
   pose.translation = {0.10 * std::sin(0.9 * time), 0.08 * std::cos(1.1 * time),
                       2.4 + 0.2 * std::sin(0.5 * time)};
   return pose;
+}
+
+/// One of four copies, twice as far away.
+Pose copy_at(const Pose& pose, int copy) {
+  const glm::dvec3 apart{copy % 2 == 0 ? -1.1 : 1.1, copy < 2 ? -0.9 : 0.9, 2.4};
+  return {pose.rotation, pose.translation + apart};
 }
 
 /// The pose of a picture eight times as large as the pattern, on a wall behind it.
@@ -140,8 +147,9 @@ int run_frames(const std::string& what, const BundleView& bundle, int width, int
   PoseLoopOptions options;
   options.extended = what == "extended";
   options.estimate_camera = what == "track-default" || what == "search-default";
-  options.track =
-      what == "track" || what == "track-default" || what == "sliced" || options.extended;
+  options.max_instances = what == "copies" ? 4 : 1;
+  options.track = what == "track" || what == "track-default" || what == "sliced" ||
+                  what == "copies" || options.extended;
   if (what == "sliced") options.budget = budget;
   const auto loop = PoseLoop::create(bundle, camera, options);
   if (!loop) return give_up(to_line(loop.error()));
@@ -154,7 +162,10 @@ int run_frames(const std::string& what, const BundleView& bundle, int width, int
     const Pose pose = pose_at(i / 30.0);
     if (options.extended) draw(background.view(), camera, behind(pose), numbers, frame);
     const bool covered = options.extended && 4 * i >= 3 * frames;
-    if (what != "clutter" && !covered) draw(pattern, camera, pose, numbers, frame);
+    for (int k = 0; k < 4 && what == "copies"; ++k)
+      draw(pattern, camera, copy_at(pose, k), numbers, frame, k == 3);
+    if (what != "clutter" && what != "copies" && !covered)
+      draw(pattern, camera, pose, numbers, frame);
     mark("begin\n");
     const auto done = (*loop)->step(frame.view(), result);
     mark("end\n");
@@ -349,7 +360,8 @@ int run_memory(const BundleView& bundle, int width, int height, int frames) {
 }
 
 int run(int count, char** words) {
-  if (count < 3) return give_up("give track|search|clutter|sliced|render|open|memory and a bundle");
+  if (count < 3)
+    return give_up("give track|copies|search|clutter|sliced|render|open|memory and a bundle");
   const std::string what = words[1];
   mark("begin\n");
   auto file = MappedFile::open(words[2]);

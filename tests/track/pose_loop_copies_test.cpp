@@ -75,7 +75,7 @@ TEST_P(PoseLoopCopies, AllAreFoundWithinTenFramesAndKeepTheirNumbers) {
   const auto loop = loop_of(kMost);
   TrackResult result;
   std::array<int, kMost> of{};
-  for (int time = 0; time < 20; ++time) {
+  for (int time = 0; time < 15; ++time) {
     const CopiesFrame frame(places(count, time));
     ASSERT_TRUE(loop->step(frame.picture.view(), result));
     EXPECT_EQ(result.crowded, -1);
@@ -85,36 +85,44 @@ TEST_P(PoseLoopCopies, AllAreFoundWithinTenFramesAndKeepTheirNumbers) {
       EXPECT_LT(worst_corner(each, frame.copies[static_cast<std::size_t>(copy)]), 2.0) << time;
       EXPECT_FALSE(std::exchange(taken[static_cast<std::size_t>(copy)], true)) << time;
       if (time == 10) of[each.copy] = copy;
-      if (time > 10) EXPECT_EQ(of[each.copy], copy) << time;
+      if (time > 10) {
+        EXPECT_EQ(of[each.copy], copy) << time;
+      }
     }
-    if (time >= 9) ASSERT_EQ(result.visible.size(), static_cast<std::size_t>(count)) << time;
+    if (time >= 9) {
+      ASSERT_EQ(result.visible.size(), static_cast<std::size_t>(count)) << time;
+    }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Counts, PoseLoopCopies, testing::Values(1, 2, 5, kMost));
+INSTANTIATE_TEST_SUITE_P(Counts, PoseLoopCopies, testing::Values(1, 2, kMost));
 
-// One passes before the other, from left to right, and covers it for some 20 frames.
+// One passes before the other, from left to right, and covers it for some 10 frames.
 TEST(PoseLoopCopiesMoving, TheNumbersSurviveACrossing) {
   for (const int budget : {0, 20}) {
     const auto loop = loop_of(2, budget);
     TrackResult result;
     std::array<int, 2> of{-1, -1};
     int right = 0;
-    constexpr int kFrames = 105;
+    constexpr int kFrames = 55;
     for (int time = 0; time < kFrames; ++time) {
-      const double x = -2.2 + 0.05 * std::clamp(time - 15, 0, 80);
+      const double x = -2.2 + 0.1 * std::clamp(time - 10, 0, 40);
       const View views[] = {look_at(5.5, 5, 20, 4, 0.1, 0.05), look_at(4.6, 8, 70, -6, x, -0.1)};
       const CopiesFrame frame(views);
       ASSERT_TRUE(loop->step(frame.picture.view(), result));
       for (const Detection& each : result.visible) {
         const int copy = frame.at(each);
-        if (time == 14) of[each.copy] = copy;
-        if (time > 14) EXPECT_EQ(copy, of[each.copy]) << time;
-        right += time > 14 && worst_corner(each, frame.copies[static_cast<std::size_t>(copy)]) < 3;
+        if (time == 9) of[each.copy] = copy;
+        if (time > 9) {
+          EXPECT_EQ(copy, of[each.copy]) << time;
+        }
+        right += time > 9 && worst_corner(each, frame.copies[static_cast<std::size_t>(copy)]) < 3;
       }
-      if (time == 14 || time == kFrames - 1) EXPECT_EQ(result.visible.size(), 2u) << time;
+      if (time == 9 || time == kFrames - 1) {
+        EXPECT_EQ(result.visible.size(), 2u) << time;
+      }
     }
-    EXPECT_GE(right, 90 + 45) << budget;
+    EXPECT_GE(right, 45 + 25) << budget;
   }
 }
 
@@ -188,7 +196,9 @@ TEST(PoseLoopCopiesMoving, TheCApiTellsThePoseOfEachCopy) {
     modar_tracker* const tracker = modar_tracker_create(bundle, &camera, &options, nullptr);
     for (int time = 0; time < 2; ++time) {
       ASSERT_EQ(modar_tracker_step(tracker, frame.picture.pixels.data(), kWidth, -1, nullptr), 0);
-      if (time == 0) EXPECT_EQ(modar_tracker_crowded(tracker), most < 3 ? 0 : -1);
+      if (time == 0) {
+        EXPECT_EQ(modar_tracker_crowded(tracker), most < 3 ? 0 : -1);
+      }
     }
     int shown = 0;
     for (std::uint32_t copy = 0; copy < 5; ++copy) {

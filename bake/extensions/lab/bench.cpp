@@ -188,8 +188,10 @@ BenchResult bench_clutter_rows(const BenchOptions& command) {
   }
   MODAR_ASSIGN(options.backgrounds, pictures_of(command.pose.backgrounds));
   ProgressBar bar(command.pose.quiet || command.json);
-  auto rows = bench_clutter(options,
-                            [&bar](const std::string& what, double done) { bar.show(what, done); });
+  const ProgressCallback show = [&bar](const std::string& what, double done) {
+    bar.show(what, done);
+  };
+  auto rows = command.pose.copies ? bench_phantoms(options, show) : bench_clutter(options, show);
   bar.clear();
   return rows;
 }
@@ -248,9 +250,9 @@ const std::vector<Bench>& benches() {
        "the pose of a pattern out of sight, in rendered rooms, or blanked in a video, against the "
        "goals",
        bench_extended_rows},
-      {"clutter", false, "--backgrounds DIR [--patterns DIR] [--clutter N]",
-       "frames (20,000 of them) in which 30 hard patterns are found that they do not show, next to "
-       "all frames",
+      {"clutter", false, "--backgrounds DIR [--patterns DIR] [--clutter N] [--copies]",
+       "frames (20,000 of them) in which 30 hard patterns are found that they do not show, or "
+       "copies of them, next to all frames",
        bench_clutter_rows},
       {"wild", true, "CLIPS [--patterns DIR] [--only TEXT] [--parameters none]",
        "a folder of videos of real things with their truths (ours, POT-210, PlanarTrack): the pose "

@@ -27,6 +27,7 @@ struct PoseBenchRequest {
   bool scores = false;        ///< hold scores against working ranges instead
   bool field = false;         ///< phones' conditions instead: blur, noise, glare, bend
   bool shape = false;         ///< labels on bottles and cups instead
+  bool copies = false;        ///< clutter: phantom copies of the print in view instead
   bool lookalikes = false;    ///< sequences of lookalike and covered prints instead
   std::string path;           ///< replay this camera path instead; see bench_path()
   bool sift = false;          ///< also OpenCV's SIFT with MAGSAC

@@ -64,6 +64,7 @@ void add_pose_options(CommandLine& line, PoseBenchRequest& pose) {
             "mirrored prints, other editions");
   line.flag("--shape", pose.shape,
             "Labels on cylinders and cones, and boxes, from 0 to 70 degrees about the axis");
+  line.flag("--copies", pose.copies, "clutter: phantom copies of the one print that is in view");
   line.flag("--lookalikes", pose.lookalikes,
             "Two seconds each of other editions, mirror images and covered prints");
   line.option("--path", &pose.path,

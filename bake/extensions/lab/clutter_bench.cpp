@@ -1,5 +1,6 @@
 #include "bake/extensions/lab/clutter_bench.hpp"
 
+#include <array>
 #include <map>
 #include <memory>
 #include <span>
@@ -24,6 +25,11 @@ struct ExpectedBundle {
   std::vector<std::byte> bytes;
   std::unique_ptr<PoseLoop> loop;
 };
+
+tl::unexpected<Error> no_backgrounds() {
+  return fail(ExitCode::kUsage, "bench.input", "", "the bench needs backgrounds",
+              "give a folder with pictures");
+}
 
 /// The hard prints and the requested patterns.
 Result<std::vector<HardPrint>> all_prints(const PoseBenchOptions& options) {
@@ -103,9 +109,10 @@ class ClutterTally {
   std::map<std::string, double> named_;
 };
 
-/// A hand moves a print before the loop.
+/// A hand moves a print before the loop; `add` takes what it sees of each frame.
+template <class Add>
 Result<void> show_print(const HardPrint& print, const GrayPicture& behind, Random& random,
-                        const ExpectedBundle& wanted, ClutterTally& tally) {
+                        PoseLoop& loop, int frames, const Add& add) {
   const Camera camera = default_camera(kWidth, kHeight);
   SceneBand band;
   band.area_low = 0.2;
@@ -113,11 +120,11 @@ Result<void> show_print(const HardPrint& print, const GrayPicture& behind, Rando
   band.tilt_high = 60;
   const HandPath path(draw_pose(band, print.picture.view(), camera, random), random);
   const SceneLight light = draw_light(random);
-  for (int i = 0; i < kSequence; ++i) {
+  for (int i = 0; i < frames; ++i) {
     const SceneFrame scene = render_scene(print.picture.view(), camera, path.at(i / 30.0, 1.0),
                                           behind, band, random, &light);
-    MODAR_ASSIGN(const TrackResult seen, wanted.loop->step(scene.picture.view()));
-    tally.add(wanted, seen, print.kind);
+    MODAR_ASSIGN(const TrackResult seen, loop.step(scene.picture.view()));
+    add(seen);
   }
   return {};
 }
@@ -127,10 +134,7 @@ Result<void> show_print(const HardPrint& print, const GrayPicture& behind, Rando
 Result<std::vector<BenchRow>> bench_clutter(const PoseBenchOptions& options,
                                             const ProgressCallback& progress) {
   MODAR_ASSIGN(const auto photos, load_backgrounds(options.backgrounds, kWidth, kHeight));
-  if (photos.empty()) {
-    return fail(ExitCode::kUsage, "bench.input", "", "the bench needs backgrounds",
-                "give a folder with pictures");
-  }
+  if (photos.empty()) return no_backgrounds();
   MODAR_ASSIGN(const auto prints, all_prints(options));
   MODAR_ASSIGN(const auto bundles, bake_all(prints, options));
   Random random(options.seed + 4099);
@@ -150,11 +154,50 @@ Result<std::vector<BenchRow>> bench_clutter(const PoseBenchOptions& options,
     wanted.loop->reset();
     if (shown.empty()) shown = hard_prints(random);
     const std::size_t which = random.next() % shown.size();
-    MODAR_TRY(show_print(shown[which], photo(), random, wanted, tally));
+    const HardPrint& print = shown[which];
+    MODAR_TRY(show_print(print, photo(), random, *wanted.loop, kSequence,
+                         [&](const TrackResult& seen) { tally.add(wanted, seen, print.kind); }));
     shown.erase(shown.begin() + static_cast<std::ptrdiff_t>(which));
     wanted.loop->reset();
   }
   return tally.rows();
+}
+
+Result<std::vector<BenchRow>> bench_phantoms(const PoseBenchOptions& options,
+                                             const ProgressCallback& progress) {
+  constexpr int kFrames = 3 * kSequence;  // of a print in a turn: some searches for more copies
+  MODAR_ASSIGN(const auto photos, load_backgrounds(options.backgrounds, kWidth, kHeight));
+  if (photos.empty()) return no_backgrounds();
+  MODAR_ASSIGN(const auto prints, all_prints(options));
+  PoseLoopOptions how;
+  how.max_instances = 8;
+  how.estimate_camera = !options.known_camera;
+  std::map<std::string, std::array<double, 3>> counts;  // of all frames, phantoms, shown
+  Random random(options.seed + 4099);
+  for (std::size_t turn = 0; counts["all prints"][0] < options.clutter_frames; ++turn) {
+    const HardPrint& print = prints[turn % prints.size()];
+    if (progress) progress("copies", counts["all prints"][0] / options.clutter_frames);
+    MODAR_ASSIGN(const auto record, make_tracker_record(print.picture.view(), {}));
+    MODAR_ASSIGN(const auto bytes, bundle_of_records({&print.picture, 1}, {&record, 1}));
+    MODAR_ASSIGN(const auto bundle, BundleView::open(bytes));
+    MODAR_ASSIGN(const auto loop, PoseLoop::create(bundle, default_camera(kWidth, kHeight), how));
+    const GrayPicture behind = another_view(photos[random.next() % photos.size()], random);
+    MODAR_TRY(show_print(print, behind, random, *loop, kFrames, [&](const TrackResult& seen) {
+      for (const std::string& name : {std::string("all prints"), print.kind}) {
+        auto& [frames, phantoms, shown] = counts[name];
+        ++frames;
+        phantoms += seen.visible.size() > 1 ? 1 : 0;
+        shown += seen.visible.empty() ? 0 : 1;
+      }
+    }));
+  }
+  std::vector<BenchRow> rows;
+  for (const auto& [name, count] : counts) {
+    const auto& [frames, phantoms, shown] = count;
+    rows.push_back({"phantom_frames " + name, phantoms, frames, ratio(phantoms, frames)});
+    rows.push_back({"shown_frames " + name, shown, frames, ratio(shown, frames)});
+  }
+  return rows;
 }
 
 }  // namespace modar

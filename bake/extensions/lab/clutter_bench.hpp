@@ -16,4 +16,11 @@ namespace modar {
 Result<std::vector<BenchRow>> bench_clutter(const PoseBenchOptions& options,
                                             const ProgressCallback& progress);
 
+/// Shows hard_prints() and options.patterns one after the other in a hand in front of a photo, in
+/// options.clutter_frames frames in all, to a tracker of up to eight copies of it. Rows, of all
+/// prints and of each kind: frames that show more than one copy; and frames that show the print.
+/// Errors: as of bench_detection().
+Result<std::vector<BenchRow>> bench_phantoms(const PoseBenchOptions& options,
+                                             const ProgressCallback& progress);
+
 }  // namespace modar
