@@ -291,6 +291,7 @@ std::uint16_t minor_version_of(const BundleContent& content) {
   for (const TextureRecord& texture : content.textures) {
     need(flags_since("TextureRecord", texture.flags));
   }
+  for (const PatternRecord& pattern : content.patterns) need(pattern.copies > 0 ? 4 : 0);
   for (const auto& shadow : content.shadows) {
     if (!shadow.empty()) need_section(SectionType::kShadow);
   }

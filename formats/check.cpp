@@ -644,6 +644,9 @@ void check_minor(FaultLog& log, const BundleParts& parts, bool accept_newer) {
   for (const TextureRecord& texture : parts.textures) {
     needed = std::max(needed, flags_since("TextureRecord", texture.flags));
   }
+  for (const PatternRecord& pattern : parts.patterns) {
+    if (pattern.copies > 0) needed = std::max<std::uint16_t>(needed, 4);
+  }
   const std::string states = with_numbers("it states 1.{}, ", {header.minor});
   if (header.minor < needed) {
     log.add(Rule::kMinor, offsetof(FileHeader, minor), "header",

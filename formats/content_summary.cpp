@@ -87,6 +87,9 @@ std::string record_line(const BundleParts& parts, const RecordInfo& info, std::u
   append(line, index);
   for (const FieldInfo& field : info.fields) {
     if (field.reserved) continue;
+    // Bundles from before it was added have no such field.
+    const bool added = std::string_view(field.name) == "copies";
+    if (added && load_number<std::uint32_t>(record + field.offset) == 0) continue;
     line += std::string(",\"") + field.name + "\":";
     const bool array = field.count > 1;
     for (std::size_t i = 0; i < field.count; ++i) {

@@ -72,7 +72,7 @@ MODAR_FIELDS(TextureRecord, name, width, height, source_width, source_height, fo
 MODAR_FIELDS(TextureLevelRecord, offset, alpha_offset, size, width, height, psnr_db, ssim,
              reserved);
 MODAR_FIELDS(PatternRecord, name, width, height, width_mm, half_width, half_height, score,
-             score_version, reserved);
+             score_version, copies, reserved);
 MODAR_FIELDS(ParameterSetRecord, name, id, detector, max_features, scale_factor, level_count,
              edge_threshold, first_level, wta_k, harris, patch_size, fast_threshold,
              agast_threshold, octaves, pattern_scale, descriptor_bits, max_distance, min_matches,

@@ -247,9 +247,13 @@ struct PatternRecord {
   float half_height;  ///< H of ModAR Eq. 1
   float score;        ///< 0-100; -1: not scored
   std::uint32_t score_version;
-  std::uint32_t reserved[6];
+  std::uint32_t copies;  ///< of the print that are tracked at once, 2 to kMaxCopies; 0: 1
+  std::uint32_t reserved[5];
 };
 static_assert(sizeof(PatternRecord) == 64);
+
+/// More are rarely in one view.
+inline constexpr std::uint32_t kMaxCopies = 16;
 
 enum class Detector : std::uint32_t { kFastOrb = 1, kAgastBrisk = 2 };
 

@@ -734,6 +734,10 @@ void check_pattern(const RecordCheck& check, const PatternRecord& pattern) {
   check.size(pattern.width_mm, "width_mm", kLeastPatternMm, kMostPatternMm);
   check.number(pattern.score, "score", -1.0, 100.0);
   check.reserved(pattern.reserved, sizeof(pattern.reserved));
+  if (pattern.copies == 1 || pattern.copies > kMaxCopies) {
+    check.fault(Rule::kPattern, &pattern.copies, "{} copies are not 0 or 2 to {}",
+                {pattern.copies, kMaxCopies});
+  }
   const std::uint32_t side = std::max(pattern.width, pattern.height);
   if (std::min(pattern.width, pattern.height) == 0 || side > kMaxPatternSide) {
     return check.fault(Rule::kPattern, &pattern.width, "{} x {} pixels is not a possible size",

@@ -116,7 +116,7 @@ TABLES = {
     33: ("texture_levels", Record("offset:Q alpha_offset:Q size:I width:I height:I psnr_db:f ssim:f "
                                   "reserved:I")),
     48: ("patterns", Record("name:N width:I height:I width_mm:d half_width:f half_height:f score:f "
-                            "score_version:I reserved:6I")),
+                            "score_version:I copies:I reserved:5I")),
     49: ("parameter_sets", Record(
         "name:N id:I detector:I max_features:I scale_factor:f level_count:I edge_threshold:I "
         "first_level:I wta_k:I harris:I patch_size:I fast_threshold:I agast_threshold:I octaves:I "
@@ -220,6 +220,8 @@ class Bundle:
         needed = max((SINCE.get(entry["type"], 0) for entry in self.sections), default=0)
         if any(row["flags"] & 2 for row in self.tables["materials"]) or any(row["flags"] & 4 for row in self.tables["textures"]):
             needed = max(needed, 2)
+        if any(row["copies"] for row in self.tables["patterns"]):
+            needed = max(needed, 4)
         need(self.header["minor"] >= needed, "BUNDLE_MINOR", 10, f"1.{needed} is needed")
 
     def check_meta(self, text):

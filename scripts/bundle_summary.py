@@ -32,7 +32,7 @@ def record_pairs(table, record, index, row):
     """(key, value, struct code) of a record's line."""
     yield table, index, "I"
     for name, code in record.fields:
-        if not name.startswith("reserved"):
+        if not name.startswith("reserved") and (name != "copies" or row[name] > 0):
             yield name, attributes(row) if name == "attributes" else row[name], code
 
 

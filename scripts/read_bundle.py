@@ -89,7 +89,8 @@ def check_patterns(bundle):
         side = max(row["width"], row["height"])
         need(min(row["width"], row["height"]) >= 1 and side <= 65535 and
              abs(row["half_width"] - row["width"] / side) <= 1e-6 and
-             abs(row["half_height"] - row["height"] / side) <= 1e-6, "BUNDLE_PATTERN", row["at"])
+             abs(row["half_height"] - row["height"] / side) <= 1e-6 and
+             row["copies"] in (0, *range(2, 17)), "BUNDLE_PATTERN", row["at"])
         need(row["width_mm"] == 0 or 1e-3 <= row["width_mm"] <= 1e7, "BUNDLE_NUMBER", row["at"], "width_mm")
         need(-1 <= row["score"] <= 100, "BUNDLE_NUMBER", row["at"], "score")
     ids = [row["id"] for row in tables["parameter_sets"]]

@@ -572,6 +572,7 @@ Result<void> add_pattern(const PatternRequest& request, const TrackerRecordOptio
   }
   PatternRecord record = baked.record;
   record.name = content.intern(request.name);
+  record.copies = request.copies > 1 ? request.copies : 0;
   trace.ranges.push_back(baked.range);
   add_pattern_section(content, SectionType::kTrackerRecord, std::move(baked.loop_record));
   MODAR_TRY(add_colours(request, baked, content));

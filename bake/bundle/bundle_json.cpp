@@ -273,6 +273,7 @@ Json pattern_json(const BundleView& bundle, std::uint32_t index) {
           {"width", pattern.width},
           {"height", pattern.height},
           {"width_mm", pattern.width_mm},
+          {"copies", std::max(1u, pattern.copies)},
           {"score", pattern.score < 0 ? Json() : Json(pattern.score)},
           {"grade", range ? Json(std::string(1, grade_of(*range))) : Json()},
           {"range", range ? range_json(*range, pattern.width_mm) : Json()},
@@ -305,6 +306,7 @@ std::string bundle_meta(const BakeRequest& request, const Report& report, const 
   for (const PatternRequest& pattern : request.patterns) {
     Json stated = {{"file", file_name(pattern.path)}, {"width_mm", pattern.width_mm}};
     if (!pattern.shape.text.empty()) stated.set("shape", pattern.shape.text);
+    if (pattern.copies > 1) stated.set("copies", pattern.copies);
     if (pattern.name != file_stem(pattern.path)) stated.set("name", pattern.name);
     if (patterns.size() < trace.ranges.size() && trace.ranges[patterns.size()]) {
       const ScoreRange& range = *trace.ranges[patterns.size()];

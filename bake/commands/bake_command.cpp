@@ -320,8 +320,9 @@ void add_input_options(CommandLine& line, BakeCommand& command) {
       "whole file); :210mm, :21cm or :8.3in states the printed width; "
       ":shape=cylinder,diameter=66mm,arc=120 is a label around a bottle, "
       ":shape=cone,top=80mm,bottom=60mm,arc=100 one around a cup, "
-      ":shape=box,size=120x180x40mm,right=FILE a box (also back, left, top and bottom)",
-      {.type = "FILE[:WIDTH][:shape=...]"});
+      ":shape=box,size=120x180x40mm,right=FILE a box (also back, left, top and bottom); :copies=4 "
+      "tracks up to four of it at once",
+      {.type = "FILE[:WIDTH][:shape=...][:copies=N]"});
   line.option(
       "--scene", &command.scenes,
       "Which model is on which pattern (required if there are several of either), and how: "

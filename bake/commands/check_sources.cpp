@@ -51,6 +51,7 @@ Result<void> take_project(const BundleView& bundle, const std::string& path, Sou
     pattern.name = asset.name;
     pattern.width_mm = asset.width_mm;
     pattern.shape = asset.shape;
+    pattern.copies = asset.copies;
     sources.request.patterns.push_back(std::move(pattern));
   }
   sources.texts.emplace();

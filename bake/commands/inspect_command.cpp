@@ -67,7 +67,7 @@ void print_textures(const BundleView& bundle) {
 
 void print_patterns(const BundleView& bundle) {
   if (bundle.patterns().empty()) return;
-  std::printf("\n%-18s %11s %9s", "pattern", "size", "width");
+  std::printf("\n%-18s %11s %9s %6s", "pattern", "size", "width", "copies");
   for (const ParameterSetRecord& set : bundle.parameter_sets()) {
     std::printf(" %9s", std::string(bundle.name(set.name)).c_str());
   }
@@ -77,8 +77,8 @@ void print_patterns(const BundleView& bundle) {
     const std::string size = with_numbers("{}x{}", {pattern.width, pattern.height});
     char width[32] = "-";
     if (pattern.width_mm > 0) std::snprintf(width, sizeof width, "%.4g mm", pattern.width_mm);
-    std::printf("%-18s %11s %9s", std::string(bundle.name(pattern.name)).c_str(), size.c_str(),
-                width);
+    std::printf("%-18s %11s %9s %6u", std::string(bundle.name(pattern.name)).c_str(), size.c_str(),
+                width, std::max(1u, pattern.copies));
     for (const ParameterSetRecord& each : bundle.parameter_sets()) {
       std::printf(" %9zu", bundle.features(p, each.id).keypoints.size());
     }

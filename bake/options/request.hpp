@@ -33,9 +33,10 @@ struct ModelRequest {
 
 struct PatternRequest {
   std::string path;
-  double width_mm = 0.0;  ///< 0: what the file or the shape states, or unknown
-  ShapeRequest shape{};   ///< what it is printed on; flat where nothing is stated
-  std::string name = {};  ///< empty: as name_assets() says
+  double width_mm = 0.0;     ///< 0: what the file or the shape states, or unknown
+  ShapeRequest shape{};      ///< what it is printed on; flat where nothing is stated
+  std::string name = {};     ///< empty: as name_assets() says
+  std::uint32_t copies = 0;  ///< that are tracked at once, 1 to kMaxCopies; 0: nothing is stated
 };
 
 /// How far packed positions may be from the source's, as the user states it.

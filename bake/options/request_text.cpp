@@ -14,6 +14,7 @@
 #include <fast_float/fast_float.h>
 
 #include "formats/base/address.hpp"
+#include "formats/layout.hpp"
 
 namespace modar {
 
@@ -562,6 +563,20 @@ Result<ShapeRequest> parse_shape(const std::string& text) {
 
 Result<PatternRequest> parse_pattern(const std::string& text) {
   constexpr std::string_view kShape = ":shape=";
+  constexpr std::string_view kCopies = ":copies=";
+  if (const std::size_t at = text.rfind(kCopies); at != std::string::npos) {
+    MODAR_ASSIGN(PatternRequest request, parse_pattern(text.substr(0, at)));
+    const std::string_view count = std::string_view(text).substr(at + kCopies.size());
+    double copies = 0;
+    if (!parse_number(count, copies) || copies != std::floor(copies) || copies < 1 ||
+        copies > kMaxCopies) {
+      return fail(ExitCode::kUsage, "cli.copies", "--pattern " + text,
+                  "'" + std::string(count) + "' is no number of copies",
+                  "write a number from 1 to 16, last: FILE:210mm:shape=SHAPE:copies=4");
+    }
+    request.copies = static_cast<std::uint32_t>(copies);
+    return request;
+  }
   if (const std::size_t at = text.rfind(kShape); at != std::string::npos) {
     MODAR_ASSIGN(PatternRequest request, parse_pattern(text.substr(0, at)));
     MODAR_ASSIGN(request.shape, parse_shape(text.substr(at + kShape.size())));

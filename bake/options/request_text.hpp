@@ -66,7 +66,8 @@ ModelRequest parse_model(const std::string& text);
 Result<std::array<PixelPoint, 4>> parse_corners(const std::string& text);
 
 /// "FILE", "FILE:WIDTH", a physical width with a unit of parse_unit(): 210mm, 21cm, and behind
-/// either ":shape=..." of parse_shape(). Errors: kUsage "cli.pattern", "cli.shape".
+/// either ":shape=..." of parse_shape(), and at the end ":copies=N". Errors: kUsage "cli.pattern",
+/// "cli.shape", "cli.copies".
 Result<PatternRequest> parse_pattern(const std::string& text);
 
 /// "cylinder,diameter=66mm,arc=120", "cone,top=80mm,bottom=60mm,arc=100"; arc in degrees, left out

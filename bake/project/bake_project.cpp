@@ -171,12 +171,13 @@ class ProjectBake {
                         });
   }
 
-  /// Statements of the project about an asset, apart from its settings: the width and the shape of
-  /// a pattern, what may be a model's texture.
+  /// Statements of the project about an asset, apart from its settings: the width, the shape and
+  /// the copies of a pattern, what may be a model's texture.
   [[nodiscard]] std::string traits_of(const ProjectAsset& asset) const {
     if (!asset.pattern) return own_picture(asset) ? "" : "its name is a pattern's";
     return std::to_string(asset.width_mm) +
-           (asset.shape.text.empty() ? "" : " " + asset.shape.text);
+           (asset.shape.text.empty() ? "" : " " + asset.shape.text) +
+           (asset.copies > 1 ? " copies " + std::to_string(asset.copies) : "");
   }
 
   [[nodiscard]] std::string key_of(const Task& task) const {
@@ -493,7 +494,7 @@ class ProjectBake {
     request.jobs = jobs;
     if (!project_.outside) request.within = project_.folder.empty() ? "." : project_.folder;
     if (task.asset->pattern) {
-      request.patterns = {{file, task.asset->width_mm, task.asset->shape}};
+      request.patterns = {{file, task.asset->width_mm, task.asset->shape, {}, task.asset->copies}};
     } else {
       request.models = {file};
       request.models[0].own_picture = own_picture(*task.asset);

@@ -24,13 +24,14 @@ using Settings = std::map<std::string, std::string>;
 
 /// One model or one pattern of a project.
 struct ProjectAsset {
-  std::string name;       ///< what scenes and bundles call it
-  std::string file;       ///< relative to the project's folder
-  bool pattern = false;   ///< else a model
-  double width_mm = 0.0;  ///< of a pattern; 0: what the file or its shape states, or unknown
-  ShapeRequest shape;     ///< of a pattern
-  Settings settings;      ///< of its own, above those of [bake] and of the tier
-  std::size_t table = 0;  ///< which [[model]] or [[pattern]] of the file names it
+  std::string name;          ///< what scenes and bundles call it
+  std::string file;          ///< relative to the project's folder
+  bool pattern = false;      ///< else a model
+  double width_mm = 0.0;     ///< of a pattern; 0: what the file or its shape states, or unknown
+  ShapeRequest shape;        ///< of a pattern
+  std::uint32_t copies = 0;  ///< of a pattern, as PatternRequest has them
+  Settings settings;         ///< of its own, above those of [bake] and of the tier
+  std::size_t table = 0;     ///< which [[model]] or [[pattern]] of the file names it
   std::vector<std::string> globs;  ///< of that table
   std::string where;               ///< of that table: "modar.toml:12:1"
 };

@@ -444,7 +444,7 @@ class ProjectReader {
     MODAR_ASSIGN(const auto readers, whole_.parse_tables(kind));
     Keys keys =
         keys_with_settings({"file", "name"}, pattern ? OptionPart::kPattern : OptionPart::kModel);
-    if (pattern) keys.insert(keys.end(), {"width", "height", "corners", "shape"});
+    if (pattern) keys.insert(keys.end(), {"width", "height", "corners", "shape", "copies"});
     std::set<std::string> seen;
     for (std::size_t i = 0; i < readers.size(); ++i) {
       MODAR_TRY(told(readers[i].allow(keys)));
@@ -510,6 +510,12 @@ class ProjectReader {
     if (printable(asset.name) != asset.name) return reader.wrong("name", "a name of letters");
     MODAR_TRY(reader.take_length("width", asset.width_mm));
     MODAR_TRY(take_shape(reader, asset.shape));
+    double copies = 0;
+    MODAR_TRY(reader.take("copies", copies, 1));
+    asset.copies = static_cast<std::uint32_t>(std::min(copies, 1.0 + kMaxCopies));
+    if (copies != static_cast<double>(asset.copies) || asset.copies > kMaxCopies) {
+      return reader.wrong("copies", "a whole number from 1 to 16");
+    }
     MODAR_TRY(reader.parse_settings(asset.settings));
     const std::string name = asset.name;
     std::set<std::string> left_out;

@@ -47,7 +47,9 @@ constexpr const char* kTables = R"json({"$schema": "http://json-schema.org/draft
       "items": {"type": "array", "minItems": 2, "maxItems": 2, "items": {"type": "number"}},
       "description": "Of the picture in a photo, in pixels: [[212, 80], [905, 131], [870, 640], [190, 602]], from the top left corner clockwise; modar pattern rectify finds them"},
     "shape": {"type": "string", "pattern": "^(flat|(cylinder|cone|box),.*)",
-      "description": "What it is printed on: cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,arc=100 or box,size=120x180x40mm,right=right.png"}}}},
+      "description": "What it is printed on: cylinder,diameter=66mm,arc=120 or cone,top=80mm,bottom=60mm,arc=100 or box,size=120x180x40mm,right=right.png"},
+    "copies": {"type": "integer", "minimum": 1, "maximum": 16, "default": 1,
+      "description": "Most of this print that are tracked at once, each with its content"}}}},
   "scene": {"type": "array", "items": {"type": "object",
     "description": "Which model, pictures, videos and labels are on which pattern, which sounds, and what they do",
     "additionalProperties": false, "required": ["pattern"], "properties": {

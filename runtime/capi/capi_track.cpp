@@ -33,6 +33,7 @@ struct modar_tracker {
   double time_s = 0;
   modar::TrackResult result;
   std::size_t patterns = 0;
+  std::size_t copies = 1;         ///< most of a pattern
   std::vector<modar_pose> poses;  ///< one a pattern, then those of their second copies, and so on
 };
 
@@ -75,12 +76,12 @@ modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_came
   how.budget = asked.budget;
   how.extended = asked.extended != 0;
   how.estimate_camera = asked.estimate_camera != 0;
-  how.max_instances = std::clamp(asked.max_instances, 1, modar::kMostCopies);
+  how.max_instances = std::max(asked.max_instances, 0);
   auto loop = modar::PoseLoop::create(bundle->view, ours, how);
   if (!loop) return modar::fail_null(loop.error(), error);
   const std::size_t patterns = bundle->view.patterns().size();
   const double smooth_ms = std::clamp(asked.smooth_ms, 0.0, 1000.0);
-  const auto copies = static_cast<std::size_t>(how.max_instances);
+  const std::size_t copies = modar::most_copies(bundle->view, how.max_instances);
   return new modar_tracker{bundle,
                            how,
                            ours,
@@ -92,16 +93,16 @@ modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_came
                            0,
                            {},
                            patterns,
+                           copies,
                            std::vector<modar_pose>(patterns * copies)};
 }
 
 void modar_tracker_reset(modar_tracker* tracker) {
   if (tracker == nullptr) return;
   tracker->loop->reset();
-  const auto copies = static_cast<std::size_t>(tracker->options.max_instances);
-  tracker->hysteresis = modar::Hysteresis(tracker->patterns, true, false, copies);
-  tracker->smoother = modar::PoseSmoother(tracker->patterns, tracker->smooth_ms, copies);
-  tracker->poses.assign(tracker->patterns * copies, modar_pose{});
+  tracker->hysteresis = modar::Hysteresis(tracker->patterns, true, false, tracker->copies);
+  tracker->smoother = modar::PoseSmoother(tracker->patterns, tracker->smooth_ms, tracker->copies);
+  tracker->poses.assign(tracker->patterns * tracker->copies, modar_pose{});
 }
 
 int modar_tracker_add_pattern(modar_tracker* tracker, const modar_record* record, uint32_t* pattern,
@@ -201,10 +202,7 @@ int modar_tracker_pose(const modar_tracker* tracker, uint32_t pattern, modar_pos
 
 int modar_tracker_copy(const modar_tracker* tracker, uint32_t pattern, uint32_t copy,
                        modar_pose* pose) {
-  if (tracker == nullptr || pattern >= tracker->patterns ||
-      copy >= tracker->poses.size() / tracker->patterns) {
-    return 0;
-  }
+  if (tracker == nullptr || pattern >= tracker->patterns || copy >= tracker->copies) return 0;
   const modar_pose& known = tracker->poses[copy * tracker->patterns + pattern];
   modar::give(known, pose);
   return known.visible;

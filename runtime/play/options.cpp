@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "decimal.hpp"
-#include "modar/pose_loop.hpp"
+#include "formats/layout.hpp"
 #include "runtime/platform/command_line.hpp"
 
 namespace modar {
@@ -43,7 +43,7 @@ bool set_gpu_budget(PlayOptions& options, std::string_view text) {
 }
 
 bool set_copies(PlayOptions& options, std::string_view text) {
-  options.copies = static_cast<int>(parse_count(text, kMostCopies));
+  options.copies = static_cast<int>(parse_count(text, kMaxCopies));
   return options.copies > 0;
 }
 
@@ -184,6 +184,7 @@ Result<PlayOptions> parse_options(std::span<const char* const> arguments) {
     options.bundle = argument;
   }
   MODAR_TRY(validate(options));
+  if (!(options.golden.empty() && options.record.empty())) options.copies = 1;
   return options;
 }
 
@@ -212,7 +213,8 @@ Tracking:
                       also modar calibrate)
   --extended          learn the static surroundings of a pattern, and continue while the
                       pattern is covered or out of view
-  --copies N          track up to N copies of each pattern, each with its content (default: 1)
+  --copies N          track up to N copies of each pattern, each with its content
+                      (default: as baked)
   --smooth MS         steady models at rest, which may lag by this much (default: 0, off)
   --outline           draw the outline of each visible pattern (amber while it is extended), the
                       default if no pattern has content

@@ -29,7 +29,7 @@ struct PlayOptions {
   double tolerance = 0.5;        ///< pixels; of --golden
   double smooth_ms = 0;          ///< latency that smoothing may add; 0: off
   std::uint64_t gpu_budget = 0;  ///< bytes; 0: the device's
-  int copies = 1;                ///< of each pattern that are tracked, at most
+  int copies = 0;                ///< of each pattern that are tracked, at most; 0: as baked
   int turntable = 0;             ///< frames of a turn; 0: no turntable
   int width = 640;               ///< of turntable pictures
   int height = 480;

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "frame_report.hpp"
+#include "modar/pose_loop.hpp"
 #include "pipeline.hpp"
 #include "play.hpp"
 #include "raw_source.hpp"
@@ -92,9 +93,9 @@ Player::Player(const PlayOptions& options, const BundleView& bundle)
 }
 
 void Player::reserve_items() {
-  items_.reserve(
-      static_cast<std::size_t>(options_.copies) *
-      std::max(bundle_.scenes().size() + bundle_.nodes().size(), bundle_.patterns().size()));
+  copies_ = most_copies(bundle_, options_.copies);
+  items_.reserve(copies_ * std::max(bundle_.scenes().size() + bundle_.nodes().size(),
+                                    bundle_.patterns().size()));
 }
 
 Result<void> Player::open(const PlayerSetup& setup) {
@@ -117,9 +118,10 @@ Result<void> Player::open(const PlayerSetup& setup) {
 
 /// Nothing of the frames before shows any more.
 void Player::restart_scene() {
-  const auto copies = static_cast<std::size_t>(options_.copies);
-  hysteresis_ = Hysteresis(names_.size(), options_.method != "paper", setup_.source.stills, copies);
-  smoother_ = PoseSmoother(names_.size(), options_.smooth_ms, copies);
+  copies_ = most_copies(spot_ ? spot_->view : bundle_, options_.copies);
+  hysteresis_ =
+      Hysteresis(names_.size(), options_.method != "paper", setup_.source.stills, copies_);
+  smoother_ = PoseSmoother(names_.size(), options_.smooth_ms, copies_);
 }
 
 /// Sound fits only frames that come at their own time.
@@ -214,9 +216,10 @@ Result<void> Player::follow_live(const Job& job) {
   bundle_ = live_->view;
   controls_.load(bundle_);
   open_media();
+  const std::size_t copies = copies_;
   reserve_items();
   std::vector<std::string> names = pattern_names(bundle_);
-  if (!spot_ && names != names_) {
+  if (!spot_ && (names != names_ || copies != copies_)) {
     names_ = std::move(names);
     restart_scene();
   }
@@ -238,7 +241,7 @@ FrameReport Player::begin_report(const Job& job) {
     if (spot_ || controls_.wants(seen.pattern)) report.visible.push_back(seen);
   }
   report.reason = job.track.reason;
-  report.numbered = options_.copies > 1;
+  report.numbered = copies_ > 1;
   if (job.track.crowded >= 0) tell_of_copies(static_cast<std::size_t>(job.track.crowded));
   report.camera = {job.track.camera, setup_.camera.fx > 0};
   report.camera.focal.focal = job.camera.fx * job.frame.reduced;
@@ -272,8 +275,9 @@ FrameReport Player::begin_report(const Job& job) {
 void Player::tell_of_copies(std::size_t pattern) {
   if (options_.quiet || std::exchange(told_of_copies_, true)) return;
   progress_.end();
-  std::fprintf(stderr, "modar-play: more than %d of '%s' in view; --copies N tracks more\n",
-               options_.copies, pattern < names_.size() ? names_[pattern].c_str() : "");
+  std::fprintf(
+      stderr, "modar-play: more copies of '%s' are in view than are tracked; --copies N tracks N\n",
+      pattern < names_.size() ? names_[pattern].c_str() : "");
 }
 
 /// The content of the patterns after the actions; clicks hit the previous drawing.

@@ -114,6 +114,7 @@ class Player {
   std::optional<GoldenCheck> golden_;
   std::optional<QosLog> qos_;
   std::vector<DrawItem> items_;
+  std::size_t copies_ = 1;  ///< most of a pattern that are tracked
   bool told_of_copies_ = false;
   std::shared_ptr<const SpotPattern> spot_;  ///< the one that names_ and hysteresis_ are about
 };

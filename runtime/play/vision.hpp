@@ -23,7 +23,7 @@ struct VisionOptions {
   LiveSlot* live = nullptr;         ///< newer versions of the bundle come here; may be null
   bool apart = false;               ///< our loop searches on a thread of its own (PoseLoopOptions)
   bool extended = false;            ///< ours continues from the surroundings (PoseLoopOptions)
-  int copies = 1;                   ///< of a pattern, by ours (PoseLoopOptions)
+  int copies = 0;                   ///< PoseLoopOptions::max_instances
   std::vector<glm::dvec3> turns;    ///< of a gyroscope, by frame; see read_gyroscope()
   bool stills = false;              ///< SourceInfo::stills: a new scene is searched anew
 };

@@ -41,6 +41,20 @@ constexpr int kMaxInconsistent = 2;
 
 }  // namespace
 
+std::uint32_t copies_of(const BundleView& bundle, std::uint32_t pattern, int max_instances) {
+  std::uint32_t copies = max_instances > 0 ? static_cast<std::uint32_t>(max_instances) : 1;
+  if (max_instances <= 0 && pattern < bundle.patterns().size())
+    copies = bundle.patterns()[pattern].copies;
+  return std::clamp(copies, 1u, kMaxCopies);
+}
+
+std::uint32_t most_copies(const BundleView& bundle, int max_instances) {
+  std::uint32_t most = copies_of(bundle, kNone, max_instances);
+  for (std::uint32_t i = 0; i < bundle.patterns().size(); ++i)
+    most = std::max(most, copies_of(bundle, i, max_instances));
+  return most;
+}
+
 struct PoseLoop::State {
   State(const Camera& seen_by, const PoseLoopOptions& how)
       : camera(seen_by), options(how), frame_tracker(camera, how.detect) {}
@@ -106,6 +120,8 @@ PoseLoop::~PoseLoop() = default;
                 "the bundle holds no pattern with a record for this loop",
                 "bake it with a pattern");
   }
+  for (TrackedPattern& print : state->patterns)
+    print.copies = copies_of(bundle, print.index, options.max_instances);
   state->add_copies();
   state->tracks.resize(state->patterns.size());
   state->known.reserve(state->patterns.size());
@@ -191,16 +207,15 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
 
 /// Further copies follow the prints, which keep their numbers.
 [[gnu::cold]] void PoseLoop::State::add_copies() {
-  const auto copies = static_cast<std::uint32_t>(std::clamp(options.max_instances, 1, kMostCopies));
   const std::size_t prints = patterns.size();
-  for (std::size_t i = 0; i < prints; ++i) {
-    patterns[i].first = static_cast<std::uint32_t>(i);
-    patterns[i].copies = copies;
-  }
-  patterns.reserve(prints * copies);
-  for (std::uint32_t copy = 1; copy < copies; ++copy) {
-    for (std::size_t i = 0; i < prints; ++i) patterns.push_back(patterns[i]);
-    for (std::size_t i = 0; i < prints; ++i) patterns[copy * prints + i].copy = copy;
+  for (std::size_t i = 0; i < prints; ++i) patterns[i].first = static_cast<std::uint32_t>(i);
+  for (std::uint32_t copy = 1; copy < kMaxCopies; ++copy) {
+    for (std::size_t i = 0; i < prints; ++i) {
+      if (copy >= patterns[i].copies) continue;
+      TrackedPattern another = patterns[i];
+      another.copy = copy;
+      patterns.push_back(another);
+    }
   }
 }
 

@@ -125,8 +125,9 @@ class Play(ProgramTest):
             self.assertGreater(green, 80 + max(red, blue), f"the middle of a side, {corners}")
 
     def test_copies_of_a_print_are_reported_and_tracked(self):
-        done = self.modar("bake", "--pattern", COVER, "-o", "bare.modar", "--quiet", "--parameters", "none", *QUICK)
-        self.assertEqual(done.returncode, 0, done.stderr)
+        for name, copies in ("bare.modar", ""), ("three.modar", ":copies=3"):
+            done = self.modar("bake", "--pattern", f"{COVER}{copies}", "-o", name, "--quiet", "--parameters", "none", *QUICK)
+            self.assertEqual(done.returncode, 0, done.stderr)
         sys.path.insert(0, str(ROOT / "assets"))
         from kit import png
         cover = png.read(COVER)
@@ -141,13 +142,17 @@ class Play(ProgramTest):
         png.write(self.folder / "two.png", png.Picture(wide, high, bytes(pixels)))
         one = self.play("bare.modar", "--input", "two.png", "--json")
         self.assertEqual(len(lines_of(one)[0]["visible"]), 1)
-        self.assertEqual(one.stderr.count("more than 1 of 'cover' in view"), 1, one.stderr)
-        two = self.play("bare.modar", "--input", "two.png", "--json", "--copies", "3")
-        self.assertNotIn("in view", two.stderr)
-        seen = lines_of(two)[0]["visible"]
-        self.assertEqual([each["copy"] for each in seen], [0, 1])
-        for left, x in zip(lefts, sorted(each["corners"][0][0] for each in seen)):
-            self.assertAlmostEqual(x, left, delta=2)
+        self.assertEqual(one.stderr.count("more copies of 'cover' are in view"), 1, one.stderr)
+        for bundle, *options in ("bare.modar", "--copies", "3"), ("three.modar",):
+            two = self.play(bundle, "--input", "two.png", "--json", *options)
+            self.assertNotIn("in view", two.stderr)
+            seen = lines_of(two)[0]["visible"]
+            self.assertEqual([each["copy"] for each in seen], [0, 1])
+            for left, x in zip(lefts, sorted(each["corners"][0][0] for each in seen)):
+                self.assertAlmostEqual(x, left, delta=2)
+        one = self.play("three.modar", "--input", "two.png", "--json", "--record", "r.modar-frames")
+        self.assertEqual(len(lines_of(one)[0]["visible"]), 1)
+        self.assertEqual(self.modar("check", "three.modar", "--source", COVER).returncode, 0)
 
     def test_a_bundle_that_is_replaced_is_played_on(self):
         bundle = self.bake_demo()

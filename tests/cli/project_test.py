@@ -173,6 +173,8 @@ class Files(ProjectTest):
             ("[[pattern]]\nfile = \u201cpictures/a.png\u201d\n", "modar.toml:2", "straight quotes", "project.toml"),
             ("[[pattern]]\nfile = \"pictures/a.png\"\nwidth = 210\n", "modar.toml:3", "as in \"210mm\"", "project.value"),
             ("[[pattern]]\nfile = \"pictures/a.png\"\nwidth = \"8 inches\"\n", "modar.toml:3", "write 8in", "project.value"),
+            ("[[pattern]]\nfile = \"pictures/a.png\"\ncopies = 17\n", "modar.toml:3", "from 1 to 16", "project.value"),
+            ("[[pattern]]\nfile = \"pictures/a.png\"\ncopies = 2.5\n", "modar.toml:3", "from 1 to 16", "project.value"),
             ("[[pattern]]\nfile = \"pictures/a.png\"\nheight = \"20cm\"\n", "modar.toml:3", "state the width alone", "project.value"),
             ("[[pattern]]\nfile = \"pictures/a.png\"\ncorners = [[0, 0], [9, 9], [9, 0], [0, 9]]\n", "modar.toml:3", "clockwise",
              "project.value"),

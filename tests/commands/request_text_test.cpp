@@ -94,6 +94,22 @@ TEST(Name, StandsBeforeAFile) {
   EXPECT_EQ(pattern->width_mm, 210);
 }
 
+TEST(Pattern, CopiesComeLast) {
+  const auto pattern = parse_pattern("front=a/1.png:210mm:shape=cylinder,diameter=66mm:copies=4");
+  ASSERT_TRUE(pattern) << to_line(pattern.error());
+  EXPECT_EQ(pattern->path, "a/1.png");
+  EXPECT_EQ(pattern->width_mm, 210);
+  EXPECT_EQ(pattern->shape.kind, ShapeRequest::Kind::kCylinder);
+  EXPECT_EQ(pattern->copies, 4u);
+  EXPECT_EQ(parse_pattern("a/1.png:copies=16")->copies, 16u);
+  EXPECT_EQ(parse_pattern("a/1.png")->copies, 0u);
+  for (const char* wrong : {"0", "17", "2.5", "two", "", "-1", "4:210mm"}) {
+    const auto refused = parse_pattern(std::string("a/1.png:copies=") + wrong);
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_EQ(refused.error().code, "cli.copies") << wrong;
+  }
+}
+
 TEST(Name, TheFoldersWhereFilesAreCalledAlike) {
   BakeRequest request;
   request.models = {ModelRequest("bear/scene.gltf"), ModelRequest("fox/scene.gltf"),

@@ -98,7 +98,7 @@ constexpr CorruptCase kSectionCases[] = {
     {"BUNDLE_RESERVED",
      [] {
        return damaged(pattern_content(), [](Bytes& b) {
-         record_of<PatternRecord>(b, SectionType::kPatterns).reserved[5] = 1;
+         record_of<PatternRecord>(b, SectionType::kPatterns).reserved[4] = 1;
        });
      }},
     {"BUNDLE_ENUM",

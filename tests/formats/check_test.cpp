@@ -1,5 +1,6 @@
 // The checker proves itself: no flipped bit goes unseen, and every issue has a file that shows it.
 #include "formats/check.hpp"
+#include "formats/content_summary.hpp"
 
 #include <gtest/gtest.h>
 
@@ -297,6 +298,30 @@ TEST(Check, RecordsAreBoundedWhereAHashIsWrong) {
       return issue.starts_with(wanted);
     })) << wanted;
   }
+}
+
+TEST(Check, CopiesOfAPatternAreTwoToSixteenAndNeedTheVersionThatAddedThem) {
+  const auto said = [](std::uint32_t copies, std::uint16_t minor) {
+    BundleContent content = lit_content();
+    content.patterns[0].copies = copies;
+    content.summary.clear();
+    content.summary = content_summary_of(content);
+    Bytes bytes = encode(content);
+    EXPECT_EQ(reinterpret_cast<FileHeader*>(bytes.data())->minor, copies > 0 ? 4 : 2);
+    const std::string text(reinterpret_cast<const char*>(content.summary.data()),
+                           content.summary.size());
+    EXPECT_EQ(text.find("\"copies\":" + std::to_string(copies)) != std::string::npos, copies > 0);
+    reinterpret_cast<FileHeader*>(bytes.data())->minor = minor;
+    rehash(bytes);
+    const std::string line = report(bytes).front();
+    return line.substr(0, line.find(' ', line.find(' ') + 1));
+  };
+  EXPECT_EQ(said(0, 2), "good");
+  EXPECT_EQ(said(2, 4), "good");
+  EXPECT_EQ(said(16, 4), "good");
+  EXPECT_EQ(said(1, 4), "error BUNDLE_PATTERN");
+  EXPECT_EQ(said(17, 4), "error BUNDLE_PATTERN");
+  EXPECT_EQ(said(2, 3), "error BUNDLE_MINOR");
 }
 
 TEST(Check, ANewerMinorVersionIsForDevicesOnly) {

@@ -267,7 +267,7 @@ json dump_patterns(const BundleView& view) {
     json out;
     out["name"] = view.name(record.name);
     GET(width), GET(height), GET(width_mm), GET(half_width), GET(half_height), GET(score);
-    GET(score_version);
+    GET(score_version), GET(copies);
     rows.push_back(out);
   }
   return rows;

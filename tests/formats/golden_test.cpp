@@ -84,6 +84,7 @@ TEST_P(Golden, BothReadersDecodeTheSame) {
 TEST(SecondReader, DecodesProxiesAsOursDoes) {
   BundleContent content = lit_content();
   add_proxies(content);
+  content.patterns[0].copies = 5;
   content.summary = content_summary_of(content);
   const Bytes bytes = encode(content);
   EXPECT_EQ(report(bytes), std::vector<std::string>{"good"});

@@ -131,7 +131,7 @@ std::map<std::string, Struct> compiled() {
   MODAR_STRUCT(TextureLevelRecord, F(offset), F(alpha_offset), F(size), F(width), F(height),
                F(psnr_db), F(ssim), F(reserved))
   MODAR_STRUCT(PatternRecord, F(name), F(width), F(height), F(width_mm), F(half_width),
-               F(half_height), F(score), F(score_version), F(reserved))
+               F(half_height), F(score), F(score_version), F(copies), F(reserved))
   MODAR_STRUCT(ParameterSetRecord, F(name), F(id), F(detector), F(max_features), F(scale_factor),
                F(level_count), F(edge_threshold), F(first_level), F(wta_k), F(harris),
                F(patch_size), F(fast_threshold), F(agast_threshold), F(octaves), F(pattern_scale),

@@ -65,7 +65,8 @@ TEST(Options, AGyroscopeHelpsExtendedPosesOnly) {
 }
 
 TEST(Options, CopiesAreOneToSixteenAndNotRecorded) {
-  EXPECT_EQ(parse({"a.modar", "--input", "v"})->copies, 1);
+  EXPECT_EQ(parse({"a.modar", "--input", "v"})->copies, 0);
+  EXPECT_EQ(parse({"a.modar", "--input", "v", "--record", "r"})->copies, 1);
   EXPECT_EQ(parse({"a.modar", "--input", "v", "--copies", "16"})->copies, 16);
   for (const char* bad : {"0", "17", "-1", "two"}) {
     EXPECT_EQ(code_of({"a.modar", "--input", "v", "--copies", bad}), "usage.value") << bad;

@@ -171,6 +171,19 @@ TEST(PoseLoopCopiesMoving, CopiesThatComeBackHaveTheirNumbers) {
   }
 }
 
+TEST(PoseLoopCopiesMoving, EachPatternHasAsManyAsTheBundleStates) {
+  const auto view = [](const std::vector<std::byte>& bytes) {
+    return BundleView::open(bytes).value();
+  };
+  const auto stated = bundle_with({record()}, 3);
+  EXPECT_EQ(most_copies(view(stated), 0), 3u);
+  EXPECT_EQ(most_copies(view(stated), 2), 2u);
+  EXPECT_EQ(most_copies(view(stated), 99), kMaxCopies);
+  EXPECT_EQ(most_copies(view(bundle_of_one()), 0), 1u);
+  EXPECT_EQ(copies_of(view(stated), 0, 0), 3u);
+  EXPECT_EQ(copies_of(view(stated), 1, 0), 1u) << "of the user's own picture";
+}
+
 TEST(PoseLoopCopiesMoving, OneMoreThanMayBeTrackedIsReported) {
   for (const int copies : {1, 2}) {
     const auto loop = loop_of(copies);
@@ -185,14 +198,17 @@ TEST(PoseLoopCopiesMoving, OneMoreThanMayBeTrackedIsReported) {
 }
 
 TEST(PoseLoopCopiesMoving, TheCApiTellsThePoseOfEachCopy) {
-  modar_bundle* const bundle =
-      modar_bundle_open_bytes(bundle_of_one().data(), bundle_of_one().size(), nullptr);
   auto camera = sized<modar_camera>();
   modar_camera_default(kWidth, kHeight, &camera);
   const CopiesFrame frame(places(3, 0));
-  for (const int most : {0, 2, 4}) {
+  // What the app wants, else what the bundle states, at most.
+  for (const auto& [asked, stated] :
+       {std::pair{0, 0}, std::pair{0, 2}, std::pair{2, 0}, std::pair{4, 2}, std::pair{1, 4}}) {
+    const int most = asked > 0 ? asked : std::max(1, stated);
+    const auto bytes = bundle_with({record()}, static_cast<std::uint32_t>(stated));
+    modar_bundle* const bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), nullptr);
     auto options = sized<modar_tracker_options>();
-    options.max_instances = most;
+    options.max_instances = asked;
     modar_tracker* const tracker = modar_tracker_create(bundle, &camera, &options, nullptr);
     for (int time = 0; time < 2; ++time) {
       ASSERT_EQ(modar_tracker_step(tracker, frame.picture.pixels.data(), kWidth, -1, nullptr), 0);
@@ -209,13 +225,13 @@ TEST(PoseLoopCopiesMoving, TheCApiTellsThePoseOfEachCopy) {
       modar_tracker_pose(tracker, 0, &first);
       EXPECT_EQ(first.corners[0] == pose.corners[0], copy == 0);
     }
-    EXPECT_EQ(shown, std::clamp(most, 1, 3));
+    EXPECT_EQ(shown, std::min(most, 3));
     EXPECT_EQ(modar_tracker_copy(tracker, 1, 0, nullptr), 0);
     modar_tracker_destroy(tracker);
+    modar_bundle_close(bundle);
   }
   EXPECT_EQ(modar_tracker_copy(nullptr, 0, 0, nullptr), 0);
   EXPECT_EQ(modar_tracker_crowded(nullptr), -1);
-  modar_bundle_close(bundle);
 }
 
 }  // namespace

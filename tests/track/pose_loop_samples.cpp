@@ -27,7 +27,8 @@ const std::vector<std::byte>& record() {
   return kRecord;
 }
 
-std::vector<std::byte> bundle_with(const std::vector<std::vector<std::byte>>& records) {
+std::vector<std::byte> bundle_with(const std::vector<std::vector<std::byte>>& records,
+                                   std::uint32_t copies) {
   BundleContent content;
   for (std::size_t i = 0; i < records.size(); ++i) {
     PatternRecord pattern{};
@@ -37,6 +38,7 @@ std::vector<std::byte> bundle_with(const std::vector<std::vector<std::byte>>& re
     pattern.half_width = 1.0f;
     pattern.half_height = 0.8f;
     pattern.score = -1;
+    pattern.copies = copies;
     content.patterns.push_back(pattern);
     content.features.emplace_back();
     ExtraSection extra;

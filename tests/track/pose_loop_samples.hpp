@@ -23,7 +23,8 @@ std::vector<std::byte> record_of(const cv::Mat& picture);
 /// That of picture(), made once.
 const std::vector<std::byte>& record();
 /// A bundle with a pattern of 300x240 for each loop record.
-std::vector<std::byte> bundle_with(const std::vector<std::vector<std::byte>>& records);
+std::vector<std::byte> bundle_with(const std::vector<std::vector<std::byte>>& records,
+                                   std::uint32_t copies = 0);
 
 /// Greatest distance of a corner from its true place, pixels.
 double worst_corner(const Detection& detection, const SceneFrame& scene);

@@ -82,6 +82,8 @@ void check_patterns(ContentLog& log) {
     const double score = range ? score_of(*range) : -1;
     std::string fault;
     if (width > 0 && width != pattern.width_mm) fault = "another width";
+    if (stated[p].number_at("copies") != static_cast<double>(pattern.copies))
+      fault = "other copies";
     if (score != static_cast<double>(pattern.score)) fault = "another range than the score's";
     if ((pattern.score >= 0) != (pattern.score_version > 0) ||
         pattern.score_version > kScoreVersion) {

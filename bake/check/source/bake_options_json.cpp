@@ -61,7 +61,7 @@ void read_scenes(const Json& document, BakeRequest& request) {
   }
 }
 
-/// The widths and shapes that patterns were baked with, where the user gives none.
+/// The widths, shapes and copies that patterns were baked with, where the user gives none.
 void read_widths(const Json& document, BakeRequest& request) {
   for (const Json& stated : document["patterns"].elements()) {
     const std::string file = stated.text_at("file");
@@ -71,6 +71,8 @@ void read_widths(const Json& document, BakeRequest& request) {
       if (file_name(pattern.path) != file) continue;
       if (pattern.width_mm == 0 && width > 0) pattern.width_mm = width;
       if (pattern.shape.text.empty() && shape) pattern.shape = *shape;
+      if (pattern.copies == 0)
+        pattern.copies = static_cast<std::uint32_t>(stated.number_at("copies"));
     }
   }
 }

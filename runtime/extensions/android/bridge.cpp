@@ -44,6 +44,7 @@ struct Session {
   // Both guards to write, either to read:
   modar_bundle* bundle = nullptr;  ///< null once it is closed
   std::vector<OwnRecord> own;
+  std::uint32_t copies = 1;                            ///< most of a pattern
   modar_camera camera = modar::sized<modar_camera>();  ///< width 0: not known yet
   modar_tracker* tracker = nullptr;
   modar_renderer* renderer = nullptr;
@@ -64,6 +65,8 @@ struct Session {
   [[nodiscard]] std::uint32_t patterns() const {
     return modar_pattern_count(bundle) + static_cast<std::uint32_t>(own.size());
   }
+  /// Those of the patterns, then of their second copies, and so on.
+  [[nodiscard]] std::uint32_t pose_count() const { return copies * patterns(); }
 };
 
 /// Java holds numbers that are never given twice: a closed one is found nowhere.
@@ -141,8 +144,11 @@ jlong opened(JNIEnv* env, modar_bundle* bundle, const modar_error& error) {
   session->screen = modar_screen_create(bundle, nullptr);
   auto media = modar::sized<modar_media>();
   session->alone = modar_media_at(bundle, 0, &media) == 0;
-  session->items.resize(modar_scene_count(bundle) + modar_node_count(bundle) + 1,
-                        modar::sized<modar_item>());
+  for (std::uint32_t p = 0; p < modar_pattern_count(bundle); ++p)
+    session->copies = std::max(session->copies, modar_pattern_copies(bundle, p));
+  session->items.resize(
+      session->copies * (modar_scene_count(bundle) + modar_node_count(bundle)) + 1,
+      modar::sized<modar_item>());
   return sessions().add(std::move(session));
 }
 
@@ -205,7 +211,7 @@ void* direct(JNIEnv* env, jobject buffer, std::size_t size, const char* what) {
 }
 
 float* pose_buffer(JNIEnv* env, const Session& session, jobject buffer) {
-  const std::size_t size = session.patterns() * kPoseFloats * sizeof(float);
+  const std::size_t size = session.pose_count() * kPoseFloats * sizeof(float);
   auto* floats = static_cast<float*>(direct(env, buffer, size, "poses"));
   if (reinterpret_cast<std::uintptr_t>(floats) % alignof(float) == 0) return floats;
   misuse(env, "android.buffer", "poses", "it is not aligned", "use the whole of a direct buffer");
@@ -294,9 +300,9 @@ jint track(JNIEnv* env, Session& session, const std::uint8_t* luma, std::size_t 
   }
   jint visible = 0;
   const std::uint32_t patterns = session.patterns();
-  for (std::uint32_t i = 0; i < patterns; ++i, poses += kPoseFloats) {
+  for (std::uint32_t i = 0; i < session.pose_count(); ++i, poses += kPoseFloats) {
     auto pose = modar::sized<modar_pose>();
-    visible += modar_tracker_pose(session.tracker, i, &pose);
+    visible += modar_tracker_copy(session.tracker, i % patterns, i / patterns, &pose);
     const modar::PoseFloats floats = modar::pose_floats(pose);
     std::memcpy(poses, &floats, sizeof floats);
   }
@@ -319,11 +325,11 @@ void add_event(JNIEnv* env, jlong number, int kind, jint node) {
 /// Runs the bundle's actions; answers how many commands they give.
 std::size_t act(Session& session, double time_s, const float* poses) {
   std::uint32_t first = 0;
-  for (std::uint32_t p = session.patterns(); p-- > 0;) {
+  for (std::uint32_t p = session.pose_count(); p-- > 0;) {
     if (poses[p * kPoseFloats + kShown] == 0) continue;
     session.events.push_back(modar::sized<modar_event>());
-    session.events.back().subject = p;
-    first = p + 1;
+    session.events.back().subject = p % session.patterns();
+    first = session.events.back().subject + 1;
   }
   modar_screen_follow(session.screen, time_s, first, session.reason, session.brightness);
   const std::size_t commands =
@@ -347,10 +353,10 @@ jstring text_or_null(JNIEnv* env, jlong number, const Copy& copy) {
 /// The content of the patterns that are shown.
 void place_items(Session& session, const float* poses) {
   session.item_count = 0;
-  session.poses.assign(poses, poses + session.patterns() * kPoseFloats);
-  for (std::uint32_t p = 0; p < session.patterns(); ++p, poses += kPoseFloats) {
+  session.poses.assign(poses, poses + session.pose_count() * kPoseFloats);
+  for (std::uint32_t p = 0; p < session.pose_count(); ++p, poses += kPoseFloats) {
     if (poses[kShown] == 0) continue;
-    session.item_count += modar_screen_items(session.screen, p, poses + kView,
+    session.item_count += modar_screen_items(session.screen, p % session.patterns(), poses + kView,
                                              session.items.data() + session.item_count,
                                              session.items.size() - session.item_count);
   }
@@ -385,7 +391,7 @@ void draw_orbit(Session& session, std::uint32_t pattern, double time_s) {
   auto pose = modar::sized<modar_pose>();
   if (modar_screen_turntable(session.screen, time_s, &from) == 0) return;
   if (modar_orbit(session.bundle, pattern, &from, &camera, &pose) == 0) return;
-  std::vector<float> poses(session.patterns() * kPoseFloats, 0.0f);
+  std::vector<float> poses(session.pose_count() * kPoseFloats, 0.0f);
   poses[pattern * kPoseFloats + kShown] = 1;
   modar_view(&pose, poses.data() + pattern * kPoseFloats + kView);
   place_items(session, poses.data());
@@ -490,6 +496,11 @@ MODAR_NATIVE(void, verify)(JNIEnv* env, jclass, jlong number) {
 MODAR_NATIVE(jint, patternCount)(JNIEnv* env, jclass, jlong number) {
   const Use session(env, number, &Session::tracking);
   return session ? static_cast<jint>(session->patterns()) : 0;
+}
+
+MODAR_NATIVE(jint, poseCount)(JNIEnv* env, jclass, jlong number) {
+  const Use session(env, number, &Session::tracking);
+  return session ? static_cast<jint>(session->pose_count()) : 0;
 }
 
 MODAR_NATIVE(jstring, patternName)(JNIEnv* env, jclass, jlong number, jint index) {

@@ -115,6 +115,8 @@ int modar_model_bounds(const modar_bundle* bundle, uint32_t index, float low[3],
 
 /* The printed width of a pattern in millimetres; 0 if the bundle does not state it. */
 double modar_pattern_width_mm(const modar_bundle* bundle, uint32_t index);
+/* Copies of its print that are tracked at once where the app does not say: 1 to 16. */
+MODAR_EXPERIMENTAL uint32_t modar_pattern_copies(const modar_bundle* bundle, uint32_t index);
 /* The gray picture of a pattern as the tracker compares it with frames: `*width` times `*height`
  * bytes in rows without padding, top row first, which stay in the bundle. Returns 1, or 0 and
  * changes nothing if none exists. */
@@ -240,7 +242,7 @@ typedef struct modar_tracker_options {
    * flat patterns from the frames; see modar_tracker_camera(). */
   int estimate_camera;
   int max_instances; /* copies of one pattern that are tracked at once, each with its pose: 1 to 16;
-                        0: 1. See modar_tracker_copy() */
+                        0: as many as the bundle states of each. See modar_tracker_copy() */
 } modar_tracker_options;
 /* options: NULL: all 0. Returns NULL and an error if no pattern of the bundle can be tracked. */
 modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_camera* camera,

@@ -20,8 +20,10 @@
 
 namespace modar {
 
-/// Of PoseLoopOptions::max_instances; more are rarely in one view.
-inline constexpr int kMostCopies = 16;
+/// How many copies of a pattern are tracked: see PoseLoopOptions::max_instances.
+std::uint32_t copies_of(const BundleView& bundle, std::uint32_t pattern, int max_instances);
+/// The most of them of any pattern.
+std::uint32_t most_copies(const BundleView& bundle, int max_instances);
 
 struct PoseLoopOptions {
   DetectOptions detect;
@@ -42,8 +44,8 @@ struct PoseLoopOptions {
   /// the pattern is covered or out of the frame: Detection::extended. Takes about 0.4 MB. The
   /// camera must move beforehand: depth comes from motion.
   bool extended = false;
-  /// Copies of one print that are tracked at once, each with its own pose: 1 to 16. Searches
-  /// continue until all of them are found.
+  /// Copies of one print that are tracked at once, each with its own pose: 1 to kMaxCopies; 0: as
+  /// many as the bundle states. Searches continue until all of them are found.
   int max_instances = 1;
   /// The camera is a guess: its focal length and the aspects of flat patterns are estimated from
   /// the frames (TrackResult::camera), and no print is hidden for being curved, since a wrong

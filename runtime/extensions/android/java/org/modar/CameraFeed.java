@@ -16,19 +16,19 @@ abstract class CameraFeed implements Handler.Callback {
     private static final int HALT = 1;
 
     final Stage stage;
-    final int patterns;
+    final int poseCount;
     Handler handler;
     private HandlerThread thread;
 
-    CameraFeed(Stage stage, int patterns) {
+    CameraFeed(Stage stage, int poseCount) {
         this.stage = stage;
-        this.patterns = patterns;
+        this.poseCount = poseCount;
     }
 
     /** Camera2 where the phone has it in full; its emulation over the old interface is slower than that itself. */
-    static CameraFeed create(Context context, Stage stage, int patterns) {
-        if (Build.VERSION.SDK_INT >= 21 && NewCamera.isNative(context)) return new NewCamera(context, stage, patterns);
-        return new OldCamera(stage, patterns);
+    static CameraFeed create(Context context, Stage stage, int poseCount) {
+        if (Build.VERSION.SDK_INT >= 21 && NewCamera.isNative(context)) return new NewCamera(context, stage, poseCount);
+        return new OldCamera(stage, poseCount);
     }
 
     final void start() {

@@ -7,11 +7,11 @@ abstract class Frame {
     /** It was drawn: GL has its pixels. */
     boolean drawn;
 
-    Frame(int patterns) {
-        poses = new Poses(patterns);
+    Frame(int poseCount) {
+        poses = new Poses(poseCount);
     }
 
-    /** On the camera's thread: how many patterns are visible. */
+    /** On the camera's thread: how many patterns and copies are visible. */
     abstract int track(long session) throws ModarException;
 
     /** On GL's thread. */

@@ -322,11 +322,11 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
         followDisplay();
         try {
             Native.reset(session);
+            feed = CameraFeed.create(this, stage, Native.poseCount(session));
+            feed.start();
         } catch (ModarException error) {
             failed(error);
         }
-        feed = CameraFeed.create(this, stage, patterns.length);
-        feed.start();
     }
 
     private void stopCamera() {

@@ -31,6 +31,9 @@ public final class Native {
     /** The bundle's, then those of addPattern(). */
     public static native int patternCount(long session) throws ModarException;
 
+    /** A pose a pattern, then those of the patterns' second copies, and so on. */
+    public static native int poseCount(long session) throws ModarException;
+
     /** The model of a scene, by index from 0 on; -1: no more. */
     public static native int sceneModel(long session, int index) throws ModarException;
 
@@ -95,7 +98,7 @@ public final class Native {
      * Tracks a frame in NV21.
      *
      * @param timeS seconds, rising
-     * @param poses direct, Poses.BYTES a pattern, native order; see {@link Poses}
+     * @param poses direct, Poses.BYTES each of poseCount(), native order; see {@link Poses}
      * @return how many patterns are visible
      */
     public static native int onCameraFrame(long session, byte[] nv21, double timeS, ByteBuffer poses)

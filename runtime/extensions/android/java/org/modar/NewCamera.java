@@ -33,8 +33,8 @@ final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailable
     private boolean front;
     private double trackedS;
 
-    NewCamera(Context context, Stage stage, int patterns) {
-        super(stage, patterns);
+    NewCamera(Context context, Stage stage, int poseCount) {
+        super(stage, poseCount);
         this.context = context;
         manager = (CameraManager) context.getSystemService(Context.CAMERA_SERVICE);
         for (int i = 0; i < frames.length; i++) frames[i] = new Planes();
@@ -59,7 +59,7 @@ final class NewCamera extends CameraFeed implements ImageReader.OnImageAvailable
         volatile Image image;
 
         Planes() {
-            super(patterns);
+            super(poseCount);
         }
 
         void take(Image next) {

@@ -16,8 +16,8 @@ final class OldCamera extends CameraFeed implements Camera.PreviewCallback {
     private final Nv21[] frames = new Nv21[BUFFERS];
     private boolean halted;
 
-    OldCamera(Stage stage, int patterns) {
-        super(stage, patterns);
+    OldCamera(Stage stage, int poseCount) {
+        super(stage, poseCount);
     }
 
     /** NV21 in a callback buffer. */
@@ -25,7 +25,7 @@ final class OldCamera extends CameraFeed implements Camera.PreviewCallback {
         final byte[] pixels;
 
         Nv21(int bytes) {
-            super(patterns);
+            super(poseCount);
             pixels = new byte[bytes];
         }
 

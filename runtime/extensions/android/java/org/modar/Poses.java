@@ -6,7 +6,7 @@ import java.nio.FloatBuffer;
 
 /** The poses of one frame, in memory that the native half writes and reads. */
 public final class Poses {
-    /** Floats of a pattern, as modar/pose_floats.hpp has them; where its parts begin follows. */
+    /** Floats of a pattern or copy, as modar/pose_floats.hpp has them; where its parts begin follows. */
     public static final int FLOATS = 45;
     public static final int BYTES = 4 * FLOATS;
     public static final int VISIBLE = 0;
@@ -26,12 +26,12 @@ public final class Poses {
     public static final int ROTATION_SIGMA = 44;
 
     public final ByteBuffer bytes;
-    public final int patterns;
+    public final int count;
     private final FloatBuffer floats;
 
-    public Poses(int patterns) {
-        this.patterns = patterns;
-        bytes = ByteBuffer.allocateDirect(Math.max(1, patterns) * BYTES).order(ByteOrder.nativeOrder());
+    public Poses(int count) {
+        this.count = count;
+        bytes = ByteBuffer.allocateDirect(Math.max(1, count) * BYTES).order(ByteOrder.nativeOrder());
         floats = bytes.asFloatBuffer();
     }
 
@@ -41,12 +41,12 @@ public final class Poses {
 
     /** As if nothing was seen. */
     void clear() {
-        for (int i = 0; i < patterns; i++) floats.put(i * FLOATS + SHOWN, 0);
+        for (int i = 0; i < count; i++) floats.put(i * FLOATS + SHOWN, 0);
     }
 
     /** As if a pattern was seen, without a camera. */
     void show(int pattern) {
-        for (int i = 0; i < patterns; i++) floats.put(i * FLOATS + SHOWN, i == pattern ? 1 : 0);
+        for (int i = 0; i < count; i++) floats.put(i * FLOATS + SHOWN, i == pattern ? 1 : 0);
     }
 
     /** Measured in this frame. */

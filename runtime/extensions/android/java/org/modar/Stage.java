@@ -202,8 +202,7 @@ final class Stage implements GLSurfaceView.Renderer {
             }
             if (pattern >= 0) {
                 double now = System.nanoTime() * 1e-9;
-                if (lookedAt == null || lookedAt.patterns <= pattern)
-                    lookedAt = new Poses(Native.patternCount(session));
+                if (lookedAt == null || lookedAt.count <= pattern) lookedAt = new Poses(Native.poseCount(session));
                 lookedAt.show(pattern);
                 act(now, lookedAt);
                 Native.onDrawOrbit(session, pattern, now);
