@@ -125,6 +125,19 @@ OWN = """(async () => {
   return { index, ms, refused, seen, known, left: patterns.length, numbers: after.poses.length, reason: after.reason };
 })()"""
 
+# A frame of two prints of one pattern, twice.
+COPIES = """(async () => {
+  const { load } = await import('/modar.js');
+  const modar = await load('/copies/two.modar');
+  await modar.start(document.createElement('video'));
+  modar.stop();
+  const frame = new Uint8Array(await (await fetch('/copies/two.gray')).arrayBuffer());
+  await modar.step(frame, %d, %d, 0);
+  const { poses, copies } = await modar.step(frame, %d, %d, 1 / 30);
+  modar.close();
+  return { poses: Array.from(poses), copies };
+})()"""
+
 # Synthetic events at a gyroscope's clock: reading i of [time, rate...] as the browser would deliver it.
 READ = """(async () => {
   const { allowMotion, Gyroscope } = await import('/gyroscope.js');
@@ -338,6 +351,22 @@ class Page(ProgramTest):
             self.assertGreater(len(told["refused"]["cure"]), 20)
             self.assert_same_poses(told["seen"], played)
             self.assertEqual((told["left"], told["numbers"], told["reason"] == "visible"), (1, 45, False))
+
+    def test_each_copy_of_a_print_has_its_pose(self):
+        place = self.site / "copies"
+        place.mkdir()
+        done = self.modar("bake", "--pattern", f"{COVER}:copies=3", "--no-score", "--parameters", "none", "-o", place / "two.modar", "--quiet")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        lefts, wide = (WIDTH // 20, 11 * WIDTH // 20), 2 * WIDTH // 5
+        graph = (f"[1]scale={wide}:-1,split[a][b];[0][a]overlay={lefts[0]}:40[c];[c][b]overlay={lefts[1]}:40,format=gray")
+        subprocess.run(["ffmpeg", "-v", "error", "-f", "lavfi", "-i", f"color=gray:s={WIDTH}x{HEIGHT}", "-i", COVER, "-filter_complex", graph,
+                        "-frames:v", "1", "-f", "rawvideo", place / "two.gray"], check=True)
+        self.browser.open(self.server.url)
+        told = self.browser.run(COPIES % (WIDTH, HEIGHT, WIDTH, HEIGHT))
+        poses = [told["poses"][i:i + 45] for i in range(0, len(told["poses"]), 45)]
+        self.assertEqual((told["copies"], [pose[0] for pose in poses]), (3, [1, 1, 0]))
+        for left, x in zip(lefts, sorted(pose[16] for pose in poses[:2])):
+            self.assertAlmostEqual(x, left, delta=2)
 
     def test_corners_are_found_on_a_plain_table(self):
         painting = ROOT / "assets" / "patterns" / "painting.png"

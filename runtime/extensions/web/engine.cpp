@@ -50,7 +50,8 @@ struct Engine {
   bool in_memory = false;  ///< all of the bundle is, not what kept_ranges() names alone
   modar_camera camera = modar::sized<modar_camera>();
   double focal_sigma = 0;       ///< 0 where it is not estimated
-  PoseFloats* poses = nullptr;  ///< one a pattern, with room for kMostOwn more
+  PoseFloats* poses = nullptr;  ///< one a pattern, with room for kMostOwn more, then of copies
+  uint32_t copies = 1;          ///< most of a pattern
   OwnPattern own[kMostOwn];
   uint32_t own_count = 0;
   modar_item* items = nullptr;
@@ -66,15 +67,24 @@ struct Engine {
 };
 Engine engine;
 
+/// Poses of first copies; those of the second ones follow, and so on.
+uint32_t pose_row() {
+  return modar_pattern_count(engine.bundle) + engine.own_count;
+}
+
+size_t item_room() {
+  const uint32_t count = modar_scene_count(engine.bundle) + modar_node_count(engine.bundle);
+  return engine.copies * (count + kMostOwn);
+}
+
 /// The content of the visible patterns, as items; answers how many.
 size_t collect_items() {
-  const size_t room = modar_scene_count(engine.bundle) + modar_node_count(engine.bundle) + kMostOwn;
   engine.item_count = 0;
-  for (uint32_t p = 0; p < modar_pattern_count(engine.bundle) + engine.own_count; ++p) {
+  for (uint32_t p = 0; p < engine.copies * pose_row(); ++p) {
     if (engine.poses[p].shown == 0.0f) continue;
     engine.item_count +=
-        modar_screen_items(engine.screen, p, engine.poses[p].view, engine.items + engine.item_count,
-                           room - engine.item_count);
+        modar_screen_items(engine.screen, p % pose_row(), engine.poses[p].view,
+                           engine.items + engine.item_count, item_room() - engine.item_count);
   }
   return engine.item_count;
 }
@@ -354,12 +364,13 @@ EMSCRIPTEN_KEEPALIVE int web_open() {
   const auto bytes = engine.arriving->bytes();
   engine.bundle = modar_bundle_open_bytes(bytes.data(), bytes.size(), &engine.error);
   if (engine.bundle == nullptr) return engine.error.status;
-  engine.poses = new PoseFloats[modar_pattern_count(engine.bundle) + kMostOwn]();
-  const uint32_t items =
-      modar_scene_count(engine.bundle) + modar_node_count(engine.bundle) + kMostOwn;
-  engine.items = new modar_item[items]();
-  for (uint32_t i = 0; i < items; ++i) engine.items[i].size = sizeof(modar_item);
-  engine.events = new modar_event[modar_pattern_count(engine.bundle) + kMostOwn + 1]();
+  for (uint32_t p = 0; p < modar_pattern_count(engine.bundle); ++p)
+    engine.copies = std::max(engine.copies, modar_pattern_copies(engine.bundle, p));
+  const uint32_t poses = engine.copies * (modar_pattern_count(engine.bundle) + kMostOwn);
+  engine.poses = new PoseFloats[poses]();
+  engine.items = new modar_item[item_room()]();
+  for (uint32_t i = 0; i < item_room(); ++i) engine.items[i].size = sizeof(modar_item);
+  engine.events = new modar_event[poses + 1]();
   engine.videos = new GLuint[modar_node_count(engine.bundle)]();
   engine.screen = modar_screen_create(engine.bundle, &engine.error);
   return engine.screen == nullptr ? engine.error.status : 0;
@@ -482,15 +493,18 @@ EMSCRIPTEN_KEEPALIVE int web_step(const uint8_t* gray, size_t stride, double tim
   const int failed = modar_tracker_step(engine.tracker, gray, stride, time_s, &engine.error);
   if (failed != 0) return failed;
   engine.focal_sigma = modar_tracker_camera(engine.tracker, &engine.camera);
-  auto pose = modar::sized<modar_pose>();
-  for (uint32_t p = 0; p < modar_pattern_count(engine.bundle) + engine.own_count; ++p) {
-    modar_tracker_pose(engine.tracker, p, &pose);
+  for (uint32_t p = 0; p < engine.copies * pose_row(); ++p) {
+    auto pose = modar::sized<modar_pose>();
+    modar_tracker_copy(engine.tracker, p % pose_row(), p / pose_row(), &pose);
     engine.poses[p] = modar::pose_floats(pose);
   }
   return 0;
 }
 EMSCRIPTEN_KEEPALIVE PoseFloats* web_poses() {
   return engine.poses;
+}
+EMSCRIPTEN_KEEPALIVE uint32_t web_copies() {
+  return engine.copies;
 }
 EMSCRIPTEN_KEEPALIVE const char* web_reason() {
   return modar_reason_text(modar_tracker_reason(engine.tracker));
@@ -538,9 +552,10 @@ EMSCRIPTEN_KEEPALIVE void web_follow(double time_s, const char* reason_text, dou
   int reason = MODAR_REASON_CURVED;
   while (reason > 0 && std::strcmp(modar_reason_text(reason), reason_text) != 0) --reason;
   uint32_t shown = 0;
-  const uint32_t patterns = modar_pattern_count(engine.bundle) + engine.own_count;
-  while (shown < patterns && engine.poses[shown].shown == 0.0f) ++shown;
-  modar_screen_follow(engine.screen, time_s, shown < patterns ? shown + 1 : 0, reason, brightness);
+  const uint32_t poses = engine.copies * pose_row();
+  while (shown < poses && engine.poses[shown].shown == 0.0f) ++shown;
+  modar_screen_follow(engine.screen, time_s, shown < poses ? shown % pose_row() + 1 : 0, reason,
+                      brightness);
 }
 /// Six numbers, as modar_status has them.
 EMSCRIPTEN_KEEPALIVE const int* web_status() {
@@ -556,8 +571,7 @@ EMSCRIPTEN_KEEPALIVE void web_orbit(uint32_t pattern, int width, int height, dou
   engine.camera.width = width;
   engine.camera.height = height;
   modar_orbit(engine.bundle, baked_pattern(pattern), &from, &engine.camera, &pose);
-  for (uint32_t p = 0; p < modar_pattern_count(engine.bundle) + engine.own_count; ++p)
-    engine.poses[p].shown = 0;
+  for (uint32_t p = 0; p < engine.copies * pose_row(); ++p) engine.poses[p].shown = 0;
   engine.poses[pattern].shown = 1;
   modar_view(&pose, engine.poses[pattern].view);
 }
@@ -645,9 +659,9 @@ EMSCRIPTEN_KEEPALIVE const char* web_address(uint32_t action) {
 EMSCRIPTEN_KEEPALIVE size_t web_act(double time_s, int kind, uint32_t node, uint32_t material) {
   size_t count = 0;
   engine.events[0].size = sizeof(modar_event);
-  for (uint32_t p = 0; p < modar_pattern_count(engine.bundle) + engine.own_count; ++p) {
+  for (uint32_t p = 0; p < engine.copies * pose_row(); ++p) {
     if (engine.poses[p].shown == 0.0f) continue;
-    engine.events[count++] = {sizeof(modar_event), MODAR_SEEN, p, 0, 0};
+    engine.events[count++] = {sizeof(modar_event), MODAR_SEEN, p % pose_row(), 0, 0};
   }
   if (kind >= 0) engine.events[count++] = {sizeof(modar_event), kind, node, material, 0};
   return modar_screen_step(engine.screen, time_s, engine.events, count);
@@ -716,7 +730,10 @@ EMSCRIPTEN_KEEPALIVE const uint32_t* web_pick(int width, int height, int mirror,
 EMSCRIPTEN_KEEPALIVE const float* web_label(uint32_t node, int width, int height, int mirror,
                                             int look) {
   static float place[3];
-  const PoseFloats& pose = engine.poses[web_node(node, 0)];
+  uint32_t at = web_node(node, 0);  // of the first copy that is shown
+  while (engine.poses[at].shown == 0.0f && at + pose_row() < engine.copies * pose_row())
+    at += pose_row();
+  const PoseFloats& pose = engine.poses[at];
   auto label = modar::sized<modar_label>();
   const modar_drawing drawing = drawing_of(look != 0 ? engine.item_count : 0);
   if (pose.shown == 0.0f) return nullptr;

@@ -581,8 +581,12 @@ export class Engine {
 
   poses() {
     return new Float32Array(
-        this.#module.HEAPU8.buffer, this.#module._web_poses(), this.patterns.length * POSE_FLOATS);
+        this.#module.HEAPU8.buffer, this.#module._web_poses(),
+        this.copies * this.patterns.length * POSE_FLOATS);
   }
+
+  /** Most of a pattern. In poses(), second copies follow the first ones of all patterns. */
+  get copies() { return this.#module._web_copies(); }
 
   get heapBytes() { return this.#module.HEAPU8.length; }
 

@@ -109,6 +109,7 @@ async function track(message) {
     focal: engine.focal,
     focalSigma: engine.focalSigma,
     poses,
+    copies: engine.copies,
     reason: engine.reason,
     brightness: engine.brightness(stride),
     heapBytes: engine.heapBytes,

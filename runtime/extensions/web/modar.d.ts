@@ -36,6 +36,8 @@ export interface Camera {
  */
 export interface Pose {
   pattern: number;
+  /** Of the pattern's copies in view, from 0; kept while it is tracked, and where it is found again. */
+  copy: number;
   name: string;
   /** Seconds, of the frame. */
   time: number;
@@ -74,8 +76,10 @@ export interface Frame {
   source: VideoFrame | HTMLCanvasElement;
   time: number;
   camera: Camera;
-  /** 45 numbers a pattern, for View.draw(). */
+  /** 45 numbers a pattern, for View.draw(); then those of second copies, and so on. */
   poses: Float32Array;
+  /** Most of a pattern that are tracked at once. */
+  copies: number;
   reason: Reason;
   /** Mean of the frame's gray values, 0 to 255. */
   brightness: number;
@@ -92,7 +96,7 @@ export interface Frame {
 export interface ModarEvents {
   found: CustomEvent<Pose>;
   updated: CustomEvent<Pose>;
-  lost: CustomEvent<{ pattern: number; name: string; time: number; reason: Reason }>;
+  lost: CustomEvent<{ pattern: number; copy: number; name: string; time: number; reason: Reason }>;
   /** After the events of this frame's patterns: draw now. */
   frame: CustomEvent<Frame>;
   /** While nothing is known: a frame that came during a search and is not looked at. Draw it as in `frame`. */

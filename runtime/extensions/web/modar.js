@@ -551,9 +551,12 @@ export class Modar extends EventTarget {
       focalSigma: answer.focalSigma
     };
     let projection = null;
-    for (let pattern = 0; pattern < this.patterns.length; ++pattern) {
-      const pose = poses.subarray(pattern * POSE_FLOATS, (pattern + 1) * POSE_FLOATS);
-      if (pose.length === 0) break;  // added since the frame was taken
+    const row = poses.length / POSE_FLOATS / answer.copies;
+    for (let i = 0; i < answer.copies * row; ++i) {
+      const pattern = i % row;
+      const copy = (i - pattern) / row;
+      if (pattern >= this.patterns.length) continue;  // forgotten since the frame was taken
+      const pose = poses.subarray(i * POSE_FLOATS, (i + 1) * POSE_FLOATS);
       const shown = pose[POSE.shown] !== 0;
       const {name} = this.patterns[pattern];
       if (shown) {
@@ -562,6 +565,7 @@ export class Modar extends EventTarget {
         const part = (from, count) => pose.slice(from, from + count);
         const detail = {
           pattern,
+          copy,
           name,
           time,
           camera,
@@ -579,13 +583,13 @@ export class Modar extends EventTarget {
           positionSigma: pose[POSE.positionSigma],
           rotationSigma: pose[POSE.rotationSigma],
         };
-        if (!this.#known[pattern]) this.dispatchEvent(new CustomEvent('found', {detail}));
+        if (!this.#known[i]) this.dispatchEvent(new CustomEvent('found', {detail}));
         this.dispatchEvent(new CustomEvent('updated', {detail}));
-      } else if (this.#known[pattern]) {
+      } else if (this.#known[i]) {
         this.dispatchEvent(
-            new CustomEvent('lost', {detail: {pattern, name, time, reason: answer.reason}}));
+            new CustomEvent('lost', {detail: {pattern, copy, name, time, reason: answer.reason}}));
       }
-      this.#known[pattern] = shown;
+      this.#known[i] = shown;
     }
     this.dispatchEvent(new CustomEvent('frame', {
       detail:

@@ -45,8 +45,11 @@ export async function follow(bundle, engine, {video: own, ...options} = {}) {
   const camera = own ? null : new Camera();
   const video = own ?? hiddenVideo(canvas);
   const picture = pictureBelow(canvas);
-  modar.addEventListener('updated', ({detail}) => engine.place(detail.name, detail.view, detail));
-  modar.addEventListener('lost', ({detail}) => engine.place(detail.name, null, detail));
+  // An engine has one object of a pattern: the first copy's.
+  modar.addEventListener(
+      'updated', ({detail}) => detail.copy || engine.place(detail.name, detail.view, detail));
+  modar.addEventListener(
+      'lost', ({detail}) => detail.copy || engine.place(detail.name, null, detail));
   modar.addEventListener('frame', ({detail}) => {
     for (const side of /** @type {const} */ (['Left', 'Top', 'Width', 'Height']))
       picture.style.setProperty(side.toLowerCase(), `${canvas[`offset${side}`]}px`);
