@@ -15,6 +15,7 @@
 #include "bake/extensions/lab/extended_bench.hpp"
 #include "bake/extensions/lab/light_bench.hpp"
 #include "bake/extensions/lab/lod_bench.hpp"
+#include "bake/extensions/lab/reasons_bench.hpp"
 #include "bake/extensions/lab/render_bench.hpp"
 #include "bake/extensions/lab/ship_bench.hpp"
 #include "bake/extensions/lab/views_bench.hpp"
@@ -196,6 +197,21 @@ BenchResult bench_clutter_rows(const BenchOptions& command) {
   return rows;
 }
 
+/// Reasons of views without a find.
+BenchResult bench_reasons_rows(const BenchOptions& command) {
+  PoseBenchOptions options;
+  options.seed = command.pose.seed;
+  options.known_camera = command.pose.known_camera;
+  options.frames = command.pose.frames;
+  MODAR_ASSIGN(options.patterns, pictures_of(command.pose.patterns));
+  MODAR_ASSIGN(options.backgrounds, pictures_of(command.pose.backgrounds));
+  ProgressBar bar(command.pose.quiet || command.json);
+  auto rows = bench_reasons(options, command.pose.only,
+                            [&bar](const std::string& what, double done) { bar.show(what, done); });
+  bar.clear();
+  return rows;
+}
+
 /// Videos of real things, compared with other methods.
 BenchResult bench_wild_rows(const BenchOptions& command) {
   WildBenchOptions options;
@@ -254,6 +270,9 @@ const std::vector<Bench>& benches() {
        "frames (20,000 of them) in which 30 hard patterns are found that they do not show, or "
        "copies of them, next to all frames",
        bench_clutter_rows},
+      {"reasons", false, "--patterns DIR --backgrounds DIR [--frames N] [--only TEXT]",
+       "the reason why nothing is shown in N views of each of ten causes, next to all views",
+       bench_reasons_rows},
       {"wild", true, "CLIPS [--patterns DIR] [--only TEXT] [--parameters none]",
        "a folder of videos of real things with their truths (ours, POT-210, PlanarTrack): the pose "
        "loop with an unknown camera, against SIFT and ORB with a RANSAC homography and the ModAR "
