@@ -20,6 +20,12 @@ static_assert(MODAR_REASON_LOST_BY_BLUR == static_cast<int>(modar::Reason::kLost
 static_assert(MODAR_REASON_OUT_OF_VIEW == static_cast<int>(modar::Reason::kOutOfView));
 static_assert(MODAR_REASON_ANOTHER_PRINT == static_cast<int>(modar::Reason::kOtherPrint));
 static_assert(MODAR_REASON_CURVED == static_cast<int>(modar::Reason::kCurved));
+static_assert(MODAR_REASON_TOO_SMALL == static_cast<int>(modar::Reason::kTooSmall));
+static_assert(MODAR_REASON_TOO_DARK == static_cast<int>(modar::Reason::kTooDark));
+static_assert(MODAR_REASON_BLURRED == static_cast<int>(modar::Reason::kBlurred));
+static_assert(MODAR_REASON_OVEREXPOSED == static_cast<int>(modar::Reason::kOverexposed));
+static_assert(MODAR_REASON_GLARE == static_cast<int>(modar::Reason::kGlare));
+static_assert(MODAR_REASON_AT_THE_EDGE == static_cast<int>(modar::Reason::kAtTheEdge));
 
 struct modar_tracker {
   const modar_bundle* bundle;
@@ -226,7 +232,7 @@ int modar_tracker_reason(const modar_tracker* tracker) {
 }
 
 const char* modar_reason_text(int reason) {
-  const bool known = reason >= 0 && reason <= MODAR_REASON_CURVED;
+  const bool known = reason >= 0 && reason <= MODAR_REASON_AT_THE_EDGE;
   return known ? modar::to_string(static_cast<modar::Reason>(reason)) : "unknown";
 }
 

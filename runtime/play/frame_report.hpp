@@ -71,10 +71,21 @@ struct FrameReport {
   [[nodiscard]] double at(Stage stage) const { return ms[static_cast<std::size_t>(stage)]; }
 };
 
-inline constexpr std::array<Reason, 9> kReasons = {
-    Reason::kVisible,    Reason::kNoFeatures,         Reason::kFewMatches,
-    Reason::kNoGeometry, Reason::kFailedVerification, Reason::kLostByBlur,
-    Reason::kOutOfView,  Reason::kOtherPrint,         Reason::kCurved};
+inline constexpr std::array<Reason, 15> kReasons = {Reason::kVisible,
+                                                    Reason::kNoFeatures,
+                                                    Reason::kFewMatches,
+                                                    Reason::kNoGeometry,
+                                                    Reason::kFailedVerification,
+                                                    Reason::kLostByBlur,
+                                                    Reason::kOutOfView,
+                                                    Reason::kOtherPrint,
+                                                    Reason::kCurved,
+                                                    Reason::kTooSmall,
+                                                    Reason::kTooDark,
+                                                    Reason::kBlurred,
+                                                    Reason::kOverexposed,
+                                                    Reason::kGlare,
+                                                    Reason::kAtTheEdge};
 
 /// A frame whose picture comes later than this after the frame itself is late (30 frames a second).
 inline constexpr double kFrameBudgetMs = 1000.0 / 30.0;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace modar {
@@ -33,11 +34,18 @@ double length(double x, double y) {
   return std::sqrt(x * x + y * y);
 }
 
+/// By reason; LOOK becomes CLOSER in time.
+constexpr std::uint8_t kHints[] = {
+    MODAR_HINT_LOOK,    MODAR_HINT_LOOK,    MODAR_HINT_LOOK,   MODAR_HINT_LOOK,   MODAR_HINT_HOLD,
+    MODAR_HINT_BLURRED, MODAR_HINT_OUTSIDE, MODAR_HINT_LOOK,   MODAR_HINT_FLAT,   MODAR_HINT_CLOSER,
+    MODAR_HINT_DARK,    MODAR_HINT_BLURRED, MODAR_HINT_BRIGHT, MODAR_HINT_BRIGHT, MODAR_HINT_WHOLE};
+static_assert(std::size(kHints) == MODAR_REASON_AT_THE_EDGE + 1);
+
 int hint_for(int reason, double unseen) {
-  if (reason == MODAR_REASON_LOST_BY_BLUR) return MODAR_HINT_BLURRED;
-  if (reason == MODAR_REASON_OUT_OF_VIEW) return MODAR_HINT_OUTSIDE;
-  if (reason == MODAR_REASON_FAILED_VERIFICATION) return MODAR_HINT_HOLD;
-  return unseen > kFar ? MODAR_HINT_CLOSER : MODAR_HINT_LOOK;
+  const bool known = reason >= 0 && reason <= MODAR_REASON_AT_THE_EDGE;
+  const int hint = kHints[known ? reason : MODAR_REASON_NOT_IN_VIEW];
+  const bool far = hint == MODAR_HINT_LOOK && reason != MODAR_REASON_ANOTHER_PRINT && unseen > kFar;
+  return far ? MODAR_HINT_CLOSER : hint;
 }
 
 }  // namespace

@@ -211,6 +211,17 @@ bool FrameTracker::update(const TrackedPattern& pattern, Track& track, Detection
   const Pose expected = last.has_motion ? extrapolate(last.previous, last.pose) : last.pose;
   const PlaneMap map = last.homography_only ? last.map : map_of_pose(pattern, camera_, expected);
   track.last_reason = in_view(pattern, map, camera_) ? Reason::kLostByBlur : Reason::kOutOfView;
+  track.place = {};
+  std::array<glm::dvec2, 4> corners;
+  if (!map_corners(pattern, map, corners)) return false;
+  track.place = seen_at(corners);
+  if (last.has_motion && map_corners(pattern, map_of_pose(pattern, camera_, last.pose), corners)) {
+    track.place.step = track.place.corner - corners[0];
+  } else if (last.place.votes == LikelyPlace::kSeen) {
+    // It was lost in the frame before, and found next to where it was expected.
+    track.place.step = last.place.step + track.place.corner - last.place.corner;
+    track.place.corner += track.place.step;
+  }
   return false;
 }
 

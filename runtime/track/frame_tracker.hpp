@@ -6,6 +6,7 @@
 #include "modar/tracker.hpp"
 #include "modar/tracker_features.hpp"
 #include "pose_refinement.hpp"
+#include "reason_evidence.hpp"
 
 namespace modar::tracker {
 
@@ -29,6 +30,7 @@ struct Track {
   int inconsistent = 0;  ///< frames in a row whose patches contradict each other
   int frames_since_lost = kRecentFrames;
   Reason last_reason = Reason::kNoFeatures;  ///< why it is not tracked
+  LikelyPlace place;                         ///< where it may be, while it is not tracked
   Reason shown_reason = Reason::kVisible;    ///< why it is tracked and not shown, if it is not
   bool verified = false;                     ///< by the PrintVerifier
   bool measured = false;                     ///< by a free homography, while it is tracked

@@ -416,6 +416,17 @@ std::span<const HomographyHypothesis> PlaneMatcher::hypotheses() {
   return std::span(hypotheses_).first(count);
 }
 
+const FeatureMatch* PlaneMatcher::strongest(int& votes) const {
+  if (matches_.size() < kMinMatches) return nullptr;
+  const auto fewer = [this](std::uint32_t a, std::uint32_t b) {
+    return supporters_[a] < supporters_[b];
+  };
+  const auto best = std::max_element(order_.begin(), order_.end(), fewer);
+  if (best == order_.end()) return nullptr;
+  votes = supporters_[*best];
+  return &matches_[*best];
+}
+
 int PlaneMatcher::beside(const HomographyHypothesis& one, double near, double far) const {
   const PlaneMap map{one.homography};
   int count = 0;

@@ -89,6 +89,9 @@ class PlaneMatcher {
   /// Matches that a hypothesis of the last find() misses by `near` to `far` frame pixels, but whose
   /// scale and direction it has right.
   [[nodiscard]] int beside(const HomographyHypothesis& one, double near, double far) const;
+  [[nodiscard]] std::span<const FeatureMatch> all_matches() const { return matches_; }
+  /// The match that most others of the last find() agree with, and how many; null: none.
+  [[nodiscard]] const FeatureMatch* strongest(int& votes) const;
   /// Makes inliers() those of a hypothesis of the last find().
   void select(const TrackedPattern& pattern, const HomographyHypothesis& hypothesis);
   [[nodiscard]] PlanePoints inliers() const {

@@ -71,6 +71,9 @@ constexpr std::size_t kGuesses = 2;
 // Patterns matched in all, the one whose turn it is included. Not measured.
 constexpr std::size_t kMatched = 3;
 
+// Patterns not found until small places are looked for. Lower takes time.
+constexpr int kSmallTurns = 7;
+
 constexpr std::int64_t kLeastWork = 500'000;  // of a slice, or a search would never end
 
 std::size_t max_codes(std::span<const TrackedPattern> patterns) {
@@ -350,6 +353,7 @@ void PatternSearch::conclude(const TrackedPattern& pattern, const FrameView& fra
       (candidate.reason == Reason::kVisible && !best_.unoccluded)) {
     find_map(pattern, frame, hypotheses_.front(), best_.percent + kMapGain, candidate);
   }
+  if (candidate.reason != Reason::kVisible) note_place(pattern);
   // Small patterns have too few of the frame's features: of those at 2 to 5 % of the frame, 41 %
   // were found without the spare ones, and 67 % with them; of those covered to 70 %, 83 and 90 %
   // were right.
@@ -359,6 +363,8 @@ void PatternSearch::conclude(const TrackedPattern& pattern, const FrameView& fra
   }
   if (candidate.reason == Reason::kVisible && bent(pattern)) candidate.reason = Reason::kCurved;
   found_ = found_ || candidate.reason == Reason::kVisible;
+  candidate.place = place_;
+  place_ = {};
   if (candidate.reason == Reason::kVisible && search_next_copy(pattern, frame)) return;
   ++at_;
   next_feature_ = 0;
@@ -405,6 +411,19 @@ bool PatternSearch::shows_another(const TrackedPattern& pattern, const FrameView
     }
   }
   return false;
+}
+
+/// Keeps the place that most votes agree on, of a pattern that was not found.
+void PatternSearch::note_place(const TrackedPattern& pattern) {
+  if (features_ == Features::kSpare) {
+    small_.add(pattern, matcher_.all_matches());
+    if (++missed_ % kSmallTurns == 0) small_.find(pattern, place_);
+  }
+  int votes = 0;
+  const FeatureMatch* const match = matcher_.strongest(votes);
+  if (match == nullptr || votes <= place_.votes) return;
+  place_ = place_of(pattern, *match);
+  place_.votes = votes;
 }
 
 /// Continues the next hypothesis if it may exceed the best so far.
@@ -563,7 +582,8 @@ void PatternSearch::find_map(const TrackedPattern& pattern, const FrameView& fra
   std::array<glm::dvec2, 4> corners;
   const auto pose = nearest_pose(pattern, camera_, map);
   if (!pose || !map_corners(pattern, map, corners) || !plausible(corners)) return;
-  candidate = {Reason::kVisible, *pose, true, map, false, candidate.matches, hypothesis.inliers};
+  candidate = {Reason::kVisible,   *pose, true, map, false, candidate.matches,
+               hypothesis.inliers, {}};
 }
 
 // ---- Of a copy of the frame, in slices or on a thread of its own ----

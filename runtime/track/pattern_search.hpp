@@ -14,6 +14,7 @@
 #include "modar/tracker_features.hpp"
 #include "pattern_matching.hpp"
 #include "pose_refinement.hpp"
+#include "reason_evidence.hpp"
 #include "runtime/platform/semaphore.hpp"
 
 namespace modar::tracker {
@@ -38,6 +39,7 @@ struct DetectionCandidate {
   bool inconsistent = false;     ///< see PatchFit::inconsistent()
   int matches = 0;
   int inliers = 0;
+  LikelyPlace place;  ///< if not kVisible, of a flat pattern
 };
 
 /// A copy of a print whose place is known: a search leaves out what it explains.
@@ -102,6 +104,7 @@ class PatternSearch {
   void conclude(const TrackedPattern& pattern, const FrameView& frame);
   bool search_next_copy(const TrackedPattern& pattern, const FrameView& frame);
   [[nodiscard]] bool shows_another(const TrackedPattern& pattern, const FrameView& frame) const;
+  void note_place(const TrackedPattern& pattern);
   void next_hypothesis();
   [[nodiscard]] std::int64_t cost_of_step() const;
   /// A refined pose and the evidence for it.
@@ -167,6 +170,9 @@ class PatternSearch {
   double least_rms_ = 0;  ///< of starts_[0]
   bool decided_ = true;   ///< which of two mirror images it is
   PoseCandidate best_;
+  LikelyPlace place_;
+  SmallVotes small_;
+  int missed_ = 0;  ///< patterns not found so far
 };
 
 /// A search of its own copy of a frame.

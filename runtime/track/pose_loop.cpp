@@ -38,6 +38,8 @@ constexpr int kRefoundFrames = 10;
 // Frames in a row whose patches contradict each other (PatchFit::inconsistent()) until a pattern is
 // searched for anew; a wrong pose is shown no longer.
 constexpr int kMaxInconsistent = 2;
+// Frames without a find per look at the whole frame for the reason. Lower takes time.
+constexpr unsigned kEvidenceFrames = 4;
 
 }  // namespace
 
@@ -69,6 +71,8 @@ struct PoseLoop::State {
   std::unique_ptr<PrintVerifier> print_verifier;
   std::unique_ptr<tracker::SelfCalibration> calibration;  ///< if the camera is a guess
   std::unique_ptr<tracker::ExtendedTracking> extended;    ///< if it was requested
+  tracker::ReasonEvidence evidence;
+  unsigned frames_unseen = 0;      ///< in a row
   std::optional<glm::dvec3> turn;  ///< of what the camera sees, since the last frame
 
   void step(const GrayImage& frame, TrackResult& result);
@@ -80,6 +84,7 @@ struct PoseLoop::State {
   void list_known();
   [[nodiscard]] std::size_t place_for(std::size_t print, const Pose* pose) const;
   bool drop_double(std::size_t i, const Detection& detection, TrackResult& result);
+  void explain(TrackResult& result);
   bool start_track(const TrackedPattern& pattern, Track& track, const DetectionCandidate& candidate,
                    Detection& detection) const;
   bool measure(std::size_t i, Detection& detection);
@@ -195,10 +200,7 @@ void PoseLoop::State::step(const GrayImage& frame, TrackResult& result) {
   if (extended != nullptr) extended->step(result, turn.has_value() ? &*turn : nullptr);
   if (calibration != nullptr) calibration->place_pictures(result);
   turn.reset();
-  for (const Track& track : tracks) {
-    const Reason reason = track.tracked ? track.shown_reason : track.last_reason;
-    if (progress(reason) > progress(result.reason)) result.reason = reason;
-  }
+  explain(result);
   std::sort(result.visible.begin(), result.visible.end(),
             [](const Detection& a, const Detection& b) {
               return a.pattern != b.pattern ? a.pattern < b.pattern : a.copy < b.copy;
@@ -285,6 +287,35 @@ bool PoseLoop::State::drop_double(std::size_t i, const Detection& detection, Tra
   return true;
 }
 
+/// The reason of the pattern that came closest, as what it and the frame look like explains it. Of
+/// those that came equally close, the one with most evidence of its place.
+void PoseLoop::State::explain(TrackResult& result) {
+  std::size_t closest = 0;
+  int votes = 0;
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    const Track& track = tracks[i];
+    const Reason reason = track.tracked ? track.shown_reason : track.last_reason;
+    const int further = progress(reason) - progress(result.reason);
+    if (further < 0 || (further == 0 && track.place.votes <= votes)) continue;
+    closest = i;
+    votes = track.place.votes;
+    result.reason = reason;
+  }
+  const auto pyramid = frame_tracker.frame().pyramid;
+  if (!result.visible.empty() || pyramid.size() < tracker::kEvidenceLevels) {
+    frames_unseen = 0;
+    return;
+  }
+  tracker::LikelyPlace place = tracks[closest].place;
+  Detection hidden;
+  if (tracks[closest].tracked && frame_tracker.locate(patterns[closest], tracks[closest], hidden)) {
+    place = tracker::seen_at(hidden.corners);
+  }
+  if (frames_unseen++ % kEvidenceFrames == 0) tracker::look_at_frame(pyramid, evidence);
+  tracker::look_at_place(pyramid, place, evidence);
+  result.reason = tracker::reason_of(result.reason, evidence);
+}
+
 /// Continues with the camera estimated from the frames so far.
 void PoseLoop::State::calibrate() {
   const bool moved = calibration->apply();
@@ -298,6 +329,7 @@ void PoseLoop::State::track_all(TrackResult& result) {
     Detection detection;
     if (!track.tracked) {
       track.frames_since_lost = std::min(track.frames_since_lost + 1, tracker::kRecentFrames);
+      track.place.move();
       continue;
     }
     track.tracked = options.track && frame_tracker.update(patterns[i], track, detection);
@@ -307,11 +339,13 @@ void PoseLoop::State::track_all(TrackResult& result) {
         has_slipped(i, track)) {
       track.tracked = track.has_motion = false;
       track.last_reason = Reason::kLostByBlur;
+      track.place = tracker::seen_at(detection.corners);
     }
     const bool inconsistent = calibration == nullptr && track.inconsistent > kMaxInconsistent;
     if (track.tracked && (inconsistent || !measure(i, detection))) {
       track.tracked = track.has_motion = false;
       track.last_reason = Reason::kFailedVerification;
+      track.place = tracker::seen_at(detection.corners);
     }
     if (track.tracked && patterns[i].copies > 1 && !drop_double(i, detection, result)) continue;
     if (track.tracked && track.doubts > 0) {
@@ -471,6 +505,9 @@ void PoseLoop::State::accept(std::size_t print, const DetectionCandidate& candid
       place_for(print, candidate.reason == Reason::kVisible ? &candidate.pose : nullptr);
   if (i == patterns.size()) return;
   Track& track = tracks[i];
+  const bool kept = track.place.votes == tracker::LikelyPlace::kSeen &&
+                    track.place.frames < tracker::kRecentFrames;
+  if (!kept || candidate.place.votes == tracker::LikelyPlace::kSeen) track.place = candidate.place;
   const Track before = track;
   Detection detection;
   if (calibration != nullptr) calibration->forget_plane(i);
@@ -478,6 +515,7 @@ void PoseLoop::State::accept(std::size_t print, const DetectionCandidate& candid
       candidate.reason == Reason::kVisible && start_track(patterns[i], track, candidate, detection);
   if (here) {
     track.verified = search->verifies_finds();
+    if (before.frames_since_lost == 0) track.place = before.place;
     const bool slipped = before.verified && before.frames_since_lost < kRefoundFrames &&
                          print_verifier->has_slipped(i, frame_tracker.frame(), track);
     here = !slipped && (!track.verified || measure(i, detection));

@@ -26,6 +26,18 @@ const char* to_string(Reason reason) {
       return "another print";
     case Reason::kCurved:
       return "curved";
+    case Reason::kTooSmall:
+      return "too small";
+    case Reason::kTooDark:
+      return "too dark";
+    case Reason::kBlurred:
+      return "blurred";
+    case Reason::kOverexposed:
+      return "overexposed";
+    case Reason::kGlare:
+      return "glare";
+    case Reason::kAtTheEdge:
+      return "at the edge";
   }
   return "unknown";
 }

@@ -309,7 +309,8 @@ TEST_F(CapiTest, AnswersNullHandles) {
   EXPECT_EQ(modar_tracker_reason(nullptr), -1);
   EXPECT_STREQ(modar_reason_text(-1), "unknown");
   EXPECT_STREQ(modar_reason_text(MODAR_REASON_CURVED), "curved");
-  EXPECT_STREQ(modar_reason_text(MODAR_REASON_CURVED + 1), "unknown");
+  EXPECT_STREQ(modar_reason_text(MODAR_REASON_AT_THE_EDGE), "at the edge");
+  EXPECT_STREQ(modar_reason_text(MODAR_REASON_AT_THE_EDGE + 1), "unknown");
   modar_camera_default(8, 8, nullptr);
   modar_projection(nullptr, 1, 2, matrix);
   modar_view(nullptr, matrix);

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "modar/pose_loop.hpp"
+#include "runtime/track/reason_evidence.hpp"
 #include "tests/track/pose_loop_samples.hpp"
 
 namespace modar {
@@ -41,6 +42,77 @@ Reason reason_for(PoseLoop& loop, const GrayPicture& picture) {
   TrackResult result;
   EXPECT_TRUE(loop.step(picture.view(), result));
   return result.reason;
+}
+
+TEST(TrackerReason, FollowsFromTheEvidence) {
+  using tracker::reason_of;
+  tracker::ReasonEvidence sharp;
+  sharp.edge = 50;
+  sharp.coarse_edge = 90;
+  EXPECT_EQ(reason_of(Reason::kNoGeometry, sharp), Reason::kNoGeometry);
+  const auto with = [&](auto&& change) {
+    tracker::ReasonEvidence evidence = sharp;
+    change(evidence);
+    return evidence;
+  };
+  const auto dark = with([](auto& e) { e.brightness = 8; });
+  EXPECT_EQ(reason_of(Reason::kNoGeometry, dark), Reason::kTooDark);
+  EXPECT_EQ(reason_of(Reason::kCurved, dark), Reason::kCurved) << "it was seen well enough";
+  const auto bright = with([](auto& e) { e.saturated = 0.9; });
+  EXPECT_EQ(reason_of(Reason::kFewMatches, bright), Reason::kOverexposed);
+  const auto soft = with([](auto& e) { e.edge = 15; });
+  EXPECT_EQ(reason_of(Reason::kNoGeometry, soft), Reason::kBlurred);
+  const auto plain_wall = with([](auto& e) { e.edge = e.coarse_edge = 2; });
+  EXPECT_EQ(reason_of(Reason::kFewMatches, plain_wall), Reason::kFewMatches);
+  const auto place = [&](int votes, double side, double inside, double glare) {
+    return with([&](auto& e) {
+      e.votes = votes;
+      e.side = side;
+      e.inside = inside;
+      e.glare = glare;
+    });
+  };
+  constexpr int kSeen = tracker::LikelyPlace::kSeen;
+  EXPECT_EQ(reason_of(Reason::kFailedVerification, place(20, 0.4, 1, 0.5)), Reason::kGlare);
+  EXPECT_EQ(reason_of(Reason::kNoGeometry, place(20, 0.4, 0.3, 0)), Reason::kAtTheEdge);
+  EXPECT_EQ(reason_of(Reason::kNoGeometry, place(20, 1.4, 0.3, 0)), Reason::kNoGeometry);
+  EXPECT_EQ(reason_of(Reason::kNoGeometry, place(3, 0.4, 0.3, 0)), Reason::kNoGeometry);
+  EXPECT_EQ(reason_of(Reason::kNoGeometry, place(kSeen, 0.1, 1, 0)), Reason::kTooSmall);
+  EXPECT_EQ(reason_of(Reason::kNoGeometry, place(20, 0.1, 1, 0)), Reason::kNoGeometry);
+  EXPECT_EQ(reason_of(Reason::kNoGeometry, place(kSeen, 0.4, 0, 0)), Reason::kOutOfView);
+}
+
+TEST(TrackerReason, FeaturesOfASmallPrintAgreeOverManyFrames) {
+  tracker::TrackedPattern pattern;
+  pattern.levels[0].width = 400;
+  pattern.levels[0].height = 300;
+  // A tenth of its size, 30 x 40 pixels from (200, 100) on; one feature a frame, of six.
+  const auto vote = [](int which, glm::dvec2 corner) {
+    tracker::FeatureMatch match;
+    match.pattern = {60.0 * which + 20, 30.0 * which + 20};
+    match.affine = glm::dmat2(0.1);
+    match.ideal = corner + 0.1 * match.pattern;
+    return match;
+  };
+  const auto found = [&](auto&& corner_of, int votes, int features) {
+    tracker::SmallVotes small;
+    for (int i = 0; i < votes; ++i) {
+      const tracker::FeatureMatch match = vote(i % features, corner_of(i));
+      small.add(pattern, std::span(&match, 1));
+    }
+    tracker::LikelyPlace place;
+    small.find(pattern, place);
+    return place;
+  };
+  const auto here = [](int i) { return glm::dvec2(200 + i % 3, 100); };
+  const tracker::LikelyPlace place = found(here, 24, 6);
+  EXPECT_EQ(place.votes, tracker::LikelyPlace::kSeen);
+  EXPECT_NEAR(place.corner.x, 201, 1);
+  EXPECT_NEAR(place.right.x, 40, 1e-9);
+  EXPECT_EQ(found(here, 12, 6).votes, 0) << "by chance";
+  EXPECT_EQ(found(here, 24, 3).votes, 0) << "few of its parts";
+  const auto anywhere = [](int i) { return glm::dvec2(60 * (i % 10), 150 * (i % 3)); };
+  EXPECT_EQ(found(anywhere, 24, 6).votes, 0);
 }
 
 TEST(TrackerReason, NoFeatures) {

@@ -549,7 +549,7 @@ EMSCRIPTEN_KEEPALIVE void web_look_around(uint32_t pattern, double time_s, int p
 }
 /// A frame with the poses in web_poses(), of which the tracker says that.
 EMSCRIPTEN_KEEPALIVE void web_follow(double time_s, const char* reason_text, double brightness) {
-  int reason = MODAR_REASON_CURVED;
+  int reason = MODAR_REASON_AT_THE_EDGE;
   while (reason > 0 && std::strcmp(modar_reason_text(reason), reason_text) != 0) --reason;
   uint32_t shown = 0;
   const uint32_t poses = engine.copies * pose_row();

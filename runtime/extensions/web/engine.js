@@ -29,7 +29,8 @@ const NEEDS_SIMD = Uint8Array.of(
 
 /** As modar.h numbers them. */
 const STATES = /** @type {const} */ (['start', 'looking', 'seen', 'around']);
-const HINTS = /** @type {const} */ (['look', 'far', 'dark', 'blurred', 'outside', 'hold']);
+const HINTS = /** @type {const} */ (
+    ['look', 'far', 'dark', 'blurred', 'outside', 'hold', 'bright', 'whole', 'flat']);
 
 /** Numbers in a pose of Engine.poses(), and where its parts begin; see modar/pose_floats.hpp. */
 export const POSE_FLOATS = 45;

@@ -10,8 +10,8 @@ export interface Gesture {
 export interface ViewStatus {
   /** start: no frame came. looking, seen: the last frame of draw(). around: lookAround(). */
   state: 'start' | 'looking' | 'seen' | 'around';
-  /** What helps while nothing is seen: to look for the picture, go closer, have light, move slowly, turn back to it, hold still. */
-  hint: 'look' | 'far' | 'dark' | 'blurred' | 'outside' | 'hold';
+  /** What helps while nothing is seen: to look for the picture, go closer, have light, move slowly, turn back to it, hold still, avoid glare, show all of it, lay it flat. */
+  hint: 'look' | 'far' | 'dark' | 'blurred' | 'outside' | 'hold' | 'bright' | 'whole' | 'flat';
   /** The one whose words are shown, for a second after it went; -1: none. */
   pattern: number;
   /** Videos and sounds are heard: after press(4), and after a tap on what plays. */

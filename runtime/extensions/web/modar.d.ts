@@ -69,7 +69,7 @@ export interface Pose {
 
 /** Why no pattern is visible in a frame, as MODAR_REASON_... of modar.h. */
 export type Reason = 'visible' | 'no features' | 'few matches' | 'not in view' | 'failed verification' | 'lost by blur'
-  | 'out of view' | 'another print' | 'curved';
+  | 'out of view' | 'another print' | 'curved' | 'too small' | 'too dark' | 'blurred' | 'overexposed' | 'glare' | 'at the edge';
 
 export interface Frame {
   /** Draw it while the event is handled; afterwards it is closed. */

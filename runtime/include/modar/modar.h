@@ -291,6 +291,12 @@ enum {
   MODAR_REASON_OUT_OF_VIEW = 6,         /* it was tracked and left the frame */
   MODAR_REASON_ANOTHER_PRINT = 7,       /* another print of its series, or its mirror image */
   MODAR_REASON_CURVED = 8,              /* its paper is too curved for a planar pose */
+  MODAR_REASON_TOO_SMALL = 9,           /* it may be in view, too small to be found */
+  MODAR_REASON_TOO_DARK = 10,           /* the frame is */
+  MODAR_REASON_BLURRED = 11,            /* the frame is, and nothing was tracked */
+  MODAR_REASON_OVEREXPOSED = 12,        /* the frame is */
+  MODAR_REASON_GLARE = 13,              /* light covers the place where it may be */
+  MODAR_REASON_AT_THE_EDGE = 14,        /* most of that place is outside the frame */
 };
 /* Of the newest frame; of several patterns, that of the one that came closest to being visible. -1
  * without a tracker. */
@@ -612,6 +618,9 @@ enum {
   MODAR_HINT_BLURRED = 3,
   MODAR_HINT_OUTSIDE = 4, /* it left the frame */
   MODAR_HINT_HOLD = 5,    /* hold still, and face it */
+  MODAR_HINT_BRIGHT = 6,  /* it reflects light, or the frame is too bright */
+  MODAR_HINT_WHOLE = 7,   /* show all of it */
+  MODAR_HINT_FLAT = 8,    /* lay it flat */
 };
 typedef struct modar_status {
   size_t size;

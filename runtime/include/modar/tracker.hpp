@@ -23,8 +23,14 @@ enum class Reason : std::uint8_t {
   kFailedVerification,  ///< the homography is impossible, or the frame does not match it
   kLostByBlur,          ///< it was tracked and should be in view, but does not match
   kOutOfView,           ///< it was tracked and left the frame
-  kOtherPrint,  ///< a part of it is in view: another print of its series, or its mirror image
-  kCurved,      ///< it is in view, but its paper is too curved for a planar pose
+  kOtherPrint,   ///< a part of it is in view: another print of its series, or its mirror image
+  kCurved,       ///< it is in view, but its paper is too curved for a planar pose
+  kTooSmall,     ///< a part of it may be in view, too small to be found
+  kTooDark,      ///< the frame is
+  kBlurred,      ///< the frame is, and nothing was tracked
+  kOverexposed,  ///< the frame is
+  kGlare,        ///< light covers the place where it may be
+  kAtTheEdge,    ///< most of the place where it may be is outside the frame
 };
 /// "visible", "no features", "few matches", ...
 const char* to_string(Reason reason);

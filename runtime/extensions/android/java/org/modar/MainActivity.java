@@ -57,7 +57,8 @@ public final class MainActivity extends Activity implements Handler.Callback, Vi
     private static final int CHOSEN_MODEL = 3;
 
     /** Words of what modar.h calls MODAR_HINT_CLOSER and so on. */
-    private static final String[] HINTS = {"look", "far", "dark", "blurred", "outside", "hold"};
+    private static final String[] HINTS
+            = {"look", "far", "dark", "blurred", "outside", "hold", "bright", "outside", "flat"};
     private static final int[] MENU = {R.id.menu_go, R.id.menu_models, R.id.menu_patterns, R.id.menu_take,
             R.id.menu_choose, R.id.menu_open, R.id.menu_forget, R.id.own_how, R.id.own_use};
     private static final String[] MENU_WORDS = {"menu-go", "menu-models", "menu-patterns", "menu-take", "menu-choose",
