@@ -24,7 +24,8 @@ constexpr double kJoinPixels = 3.0;
 // Gradient of an edge, steps of a colour channel per pixel. Higher loses weak sides, lower finds
 // more wrong figures.
 constexpr double kEdge = 3;
-constexpr double kDetail = 12;  // the same of detail
+constexpr double kFaintEdge = 1.5;  // the same of white paper on a white wall
+constexpr double kDetail = 12;      // the same of detail
 // Share of an edge's strength that is left 3 pixels to either side: more is a shadow's.
 constexpr double kShadow = 0.6;
 // A figure: of the photo's area at least so much, and each corner so far from straight and closed.
@@ -534,7 +535,7 @@ bool fit_side(const Gradients& gradients, const Point& from, const Point& to, do
 /// The share of places along a side where an edge is seen that is sharpest there. alone: with
 /// nothing on either side, as the edge of paper around a printed frame; shadows fade slowly.
 double sharp_along(const Gradients& gradients, const Point& from, const Point& to,
-                   bool alone = false) {
+                   bool alone = false, double edge = kEdge) {
   const Point along = (to - from) / norm_of(to - from);
   const Point normal(-along.y, along.x);
   int sharp = 0;
@@ -545,7 +546,7 @@ double sharp_along(const Gradients& gradients, const Point& from, const Point& t
       return std::fabs(gradients.across(at + off * normal, normal));
     };
     const double here = std::max({strength(0), strength(-0.7), strength(0.7)});
-    if (here <= kEdge) continue;
+    if (here <= edge) continue;
     const bool lone = !alone || std::max(strength(-3), strength(3)) < kShadow * here;
     if (here >= std::max(strength(-2), strength(-3)) && lone) ++sharp;
   }
@@ -561,6 +562,19 @@ double least_sharp(const Gradients& gradients, const std::array<Point, 4>& corne
       const Point from = corners[i] + k * part;
       least = std::min(least, sharp_along(gradients, from, from + part));
     }
+  }
+  return least;
+}
+
+/// Of the corners, the least share of the end of a side that is sharp: the better of its two sides.
+double least_ends(const Gradients& gradients, const std::array<Point, 4>& corners) {
+  constexpr double kEnd = 0.12;  // of a side
+  double least = 1;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto end = [&](const Point& to) {
+      return sharp_along(gradients, corners[i], corners[i] + kEnd * (to - corners[i]));
+    };
+    least = std::min(least, std::max(end(corners[(i + 1) % 4]), end(corners[(i + 3) % 4])));
   }
   return least;
 }
@@ -928,12 +942,14 @@ bool holds_another(const cv::Mat& rgb, const Gradients& gradients,
 bool bordered(const Gradients& gradients, const std::array<Point, 4>& corners) {
   constexpr std::size_t kSteps = 160;  // a pixel each
   constexpr double kEqualRatio = 1.5;  // most ratio of two distances that are equal
+  constexpr double kSameRatio = 1.1;   // the same where one of the edges is weak
+  constexpr double kWeakSupport = 0.3;
   const cv::Matx33d plane = plane_of(corners);
   const auto distance = [](std::size_t k) {
     return kNearBorder + (kFarBorder - kNearBorder) * static_cast<double>(k) / kSteps;
   };
-  // Of each side, whether an edge is that far from it.
-  std::array<std::array<bool, kSteps>, 4> seen{};
+  // Of each side, the share that has an edge that far from it.
+  std::array<std::array<double, kSteps>, 4> seen{};
   for (std::size_t k = 0; k < kSteps; ++k) {
     const double off = distance(k);
     const std::array<std::array<Point, 2>, 4> sides = {
@@ -942,18 +958,26 @@ bool bordered(const Gradients& gradients, const std::array<Point, 4>& corners) {
          {on_plane(plane, 1, 1 + off), on_plane(plane, 0, 1 + off)},
          {on_plane(plane, -off, 1), on_plane(plane, -off, 0)}}};
     for (std::size_t i = 0; i < 4; ++i) {
-      seen[i][k] = sharp_along(gradients, sides[i][0], sides[i][1], true) >= kSheetSupport;
+      seen[i][k] = sharp_along(gradients, sides[i][0], sides[i][1], true, kFaintEdge);
     }
   }
-  const auto both = [&](std::size_t one, std::size_t other) {
+  const auto both = [&](std::size_t one, std::size_t other, double least, double ratio) {
+    const auto equal = [&](std::size_t k, std::size_t m) {
+      const auto [low, high] = std::minmax(seen[one][k], seen[other][m]);
+      return low >= least && high >= kSheetSupport;
+    };
     for (std::size_t k = 0; k < kSteps; ++k) {
-      for (std::size_t m = k; m < kSteps && distance(m) < kEqualRatio * distance(k); ++m) {
-        if ((seen[one][k] && seen[other][m]) || (seen[one][m] && seen[other][k])) return true;
+      for (std::size_t m = k; m < kSteps && distance(m) < ratio * distance(k); ++m) {
+        if (equal(k, m) || equal(m, k)) return true;
       }
     }
     return false;
   };
-  return both(0, 2) && both(1, 3);
+  // The fourth edge may be the weakest, and is where it has to be.
+  const bool across = both(0, 2, kSheetSupport, kEqualRatio);
+  const bool down = both(1, 3, kSheetSupport, kEqualRatio);
+  return (across && down) || (across && both(1, 3, kWeakSupport, kSameRatio)) ||
+         (down && both(0, 2, kWeakSupport, kSameRatio));
 }
 
 /// Whether a band of one colour is around a figure, as wide above it as below and as wide on its
@@ -1121,6 +1145,7 @@ Result<FoundCorners> search(const RgbaImage& photo) {
                              : "no four-sided figure stands out in the photo");
   }
   found.quarter = least_sharp(gradients, corners, 4);
+  found.ends = least_ends(gradients, corners);
   found.fills = area_of(corners) > kFilled * small.cols * small.rows;
   found.framed =
       framed(gradients, figures, corners) || (!found.fills && goes_on(gradients, corners));
@@ -1248,7 +1273,11 @@ FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found)
   cut.corners = found->corners;
   const bool unsharp = found->sharpness < kDoubtfulSharpness && !found->clear();
   const bool part = share < (unsharp ? kLeastShare : kLeastPicture) || !cut.validate();
-  if (part) return whole();
+  if (part) {
+    if (!is_drawn(corners) && !is_upright(corners) && share >= kLeastPicture)
+      picture.doubt = "part";
+    return whole();
+  }
   const bool frontal = share > kLeastFrontal && is_upright(corners);
   // A scan has such edges within it; the photo of a print from straight above has them around it.
   if (found->fills || !frontal || !found->clear()) picture.doubt = "";
@@ -1270,6 +1299,7 @@ FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found)
 
 std::string_view doubt_words(std::string_view doubt) {
   if (doubt == "rivalled") return "there are several flat objects in the photo";
+  if (doubt == "part") return "something flat stands out in it, which may be the picture";
   if (doubt == "object") return "it shows an object on a background, but not all its four edges";
   return doubt == "blurred"  ? "an edge is hidden or blurred"
          : doubt == "framed" ? "there are edges around or beyond them, perhaps those of the sheet"

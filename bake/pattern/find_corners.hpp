@@ -24,6 +24,8 @@ inline constexpr double kClearFramed = 0.99;
 /// Of each quarter of sides that the background tells nothing of: below, one of their ends may be
 /// on another edge.
 inline constexpr double kSureQuarter = 0.86;
+/// Of the ends of sides: below, a corner is cut off, as where the side of a box is seen.
+inline constexpr double kLeastEnds = 0.78;
 
 struct FoundCorners {
   std::array<PixelPoint, 4> corners{};  ///< top-left, top-right, bottom-right, bottom-left
@@ -31,6 +33,7 @@ struct FoundCorners {
   /// may be another object's, or a corner is hidden.
   double sharpness = 0;
   double quarter = 0;  ///< the same of the weakest quarter of a side
+  double ends = 0;     ///< the same at the weakest corner: of its better side
   /// Share of the weakest side on which the foreground ends, 0 to 1.
   double divided = 0;
   bool rivalled = false;  ///< another object of its size has contrast
@@ -49,7 +52,7 @@ struct FoundCorners {
   [[nodiscard]] const char* doubt() const {
     if (holds || (clear() && rivalled)) return "rivalled";
     const bool sharp = divided > 0 ? sharpness >= kDoubtfulSharpness : quarter >= kSureQuarter;
-    if (!clear() && !sharp) return "blurred";
+    if ((!clear() && !sharp) || ends < kLeastEnds) return "blurred";
     if (bordered || (framed && !(clear() && divided >= kClearFramed))) return "framed";
     return fills ? "fills" : "";
   }
@@ -68,7 +71,7 @@ struct FoundPicture {
   /// To 0.01 pixels, see FoundCorners; nothing: the file is the picture.
   std::optional<std::array<PixelPoint, 4>> corners;
   const char* doubt =
-      "";  ///< why that may be wrong: as above, "not-found" or "object"; empty: it is sure
+      "";  ///< why that may be wrong: as above, "not-found", "object" or "part"; empty: it is sure
 };
 FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found);
 /// The doubt in words for a message: "an edge is hidden or blurred".

@@ -383,6 +383,53 @@ TEST(FindPicture, ASmallFigureIsAPartOfThePicture) {
   }
 }
 
+TEST(FindPicture, AFigureThatIsTooUnsureToCutOutIsWarnedOf) {
+  Photo photo;
+  photo.image = {1000, 1000, {}};
+  FoundCorners found;
+  found.sharpness = 0.85;
+  found.corners = {{{300, 300}, {700, 300}, {700, 700}, {300, 700}}};
+  EXPECT_STREQ(find_picture(photo, found).doubt, "") << "parallel to the photo's: a layout";
+  for (const double tilt : {6.0, 40.0}) {
+    found.corners = {{{300 + tilt, 300}, {700, 300 + tilt}, {700 - tilt, 700}, {300, 700 - tilt}}};
+    const FoundPicture picture = find_picture(photo, found);
+    EXPECT_FALSE(picture.corners) << tilt;
+    EXPECT_STREQ(picture.doubt, "part") << tilt;
+  }
+  found.corners = {{{306, 300}, {580, 306}, {574, 580}, {300, 574}}};
+  EXPECT_STREQ(find_picture(photo, found).doubt, "") << "7.5 % of the photo";
+}
+
+TEST(FindPicture, ACornerThatIsCutOffIsWarnedOf) {
+  FoundCorners found;
+  found.sharpness = found.quarter = found.divided = 1;
+  found.ends = kLeastEnds - 0.001;
+  EXPECT_STREQ(found.doubt(), "blurred");
+  found.ends = kLeastEnds;
+  EXPECT_STREQ(found.doubt(), "");
+  // The outline of a box has six corners where its side is seen.
+  const Corners front = {{{201.2f, 249.8f}, {698.5f, 147.5f}, {693.9f, 423.4f}, {300.9f, 512.3f}}};
+  for (const float depth : {1.f, 1.3f}) {
+    cv::Mat table(720, 960, CV_8UC3, cv::Scalar(120, 130, 120));
+    const std::vector<cv::Point> side = {front[0], front[0] + depth * cv::Point2f(14, -28),
+                                         front[1] + depth * cv::Point2f(-18, -20), front[1]};
+    cv::fillConvexPoly(table, side, cv::Scalar(30, 40, 150), cv::LINE_AA);
+    const Verdict one = verdict(photograph(asset("game.png"), table, front), front);
+    EXPECT_FALSE(one.silent) << depth;
+  }
+}
+
+TEST(FindPicture, WhitePaperOnAWhiteWallIsNoPartOfIt) {
+  cv::Mat sheet = asset("mural.png");
+  cv::copyMakeBorder(sheet, sheet, 60, 60, 60, 60, cv::BORDER_CONSTANT, cv::Scalar(252, 252, 252));
+  const Corners corners = {
+      {{250.3f, 150.6f}, {720.2f, 120.4f}, {760.8f, 560.1f}, {220.7f, 520.9f}}};
+  for (const int wall : {240, 247, 248}) {
+    const cv::Mat plain(720, 960, CV_8UC3, cv::Scalar::all(wall));
+    EXPECT_FALSE(verdict(photograph(sheet, plain, corners), corners).silent) << wall;
+  }
+}
+
 /// A picture on a label that a program laid out, with lines of text below it or without.
 Photo label(bool text, double turned) {
   cv::Mat sheet(800, 1200, CV_8UC3, cv::Scalar(245, 245, 240));
