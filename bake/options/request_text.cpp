@@ -14,6 +14,7 @@
 #include <fast_float/fast_float.h>
 
 #include "formats/base/address.hpp"
+#include "formats/base/nearest.hpp"
 #include "formats/layout.hpp"
 
 namespace modar {
@@ -454,20 +455,15 @@ Result<double> parse_unit(const std::string& text) {
 
 namespace {
 
-bool parse_length(std::string_view text, double& mm) {
-  const auto parsed = parse_millimetres(text);
-  if (parsed) mm = *parsed;
-  return parsed.has_value();
-}
-
 /// "120x180x40mm".
 bool parse_box(std::string_view text, std::array<double, 3>& mm) {
   const std::size_t digits = text.find_last_of("0123456789.") + 1;
   const std::vector<std::string_view> parts = split(text.substr(0, digits), 'x');
   if (parts.size() != mm.size()) return false;
   for (std::size_t i = 0; i < mm.size(); ++i) {
-    if (!parse_length(std::string(parts[i]) + std::string(text.substr(digits)), mm[i]))
-      return false;
+    const auto parsed = parse_millimetres(std::string(parts[i]) + std::string(text.substr(digits)));
+    if (!parsed) return false;
+    mm[i] = *parsed;
   }
   return true;
 }
@@ -496,6 +492,78 @@ std::string commas_for_colons(std::string_view text) {
   return out;
 }
 
+tl::expected<void, WrongValue> parse_shape_corners(std::string_view value, ShapeRequest& shape) {
+  auto corners = parse_corners(commas_for_colons(value));
+  if (!corners) {
+    return tl::unexpected(WrongValue{"these are not eight numbers with colons between them",
+                                     "write X:Y of the top-left, top-right, bottom-right and "
+                                     "bottom-left corner"});
+  }
+  RectifyOptions cut;
+  cut.corners = *corners;
+  if (const auto valid = cut.validate(); !valid) {
+    return tl::unexpected(WrongValue{valid.error().cause, valid.error().cure});
+  }
+  shape.corners = *corners;
+  return {};
+}
+
+/// The sides of a box but the front.
+constexpr std::string_view kBoxSides[] = {"right", "back", "left", "top", "bottom"};
+
+/// The keys of a shape's kind, "corners" and "height" first.
+std::vector<std::string_view> shape_keys(const ShapeRequest& shape) {
+  std::vector<std::string_view> keys = {"corners", "height"};
+  switch (shape.kind) {
+    case ShapeRequest::Kind::kBox:
+      keys.push_back("size");
+      keys.insert(keys.end(), std::begin(kBoxSides), std::end(kBoxSides));
+      break;
+    case ShapeRequest::Kind::kCylinder:
+      keys.insert(keys.end(), {"diameter", "arc"});
+      break;
+    case ShapeRequest::Kind::kCone:
+      keys.insert(keys.end(), {"top", "bottom", "arc"});
+      break;
+    default:
+      break;
+  }
+  return keys;
+}
+
+/// One part of a shape, of a key that its kind has.
+tl::expected<void, WrongValue> parse_shape_part(std::string_view key, std::string_view value,
+                                                ShapeRequest& shape) {
+  const auto length = [&](double& mm) -> tl::expected<void, WrongValue> {
+    const auto parsed = parse_millimetres(value);
+    if (!parsed) return tl::unexpected(parsed.error());
+    mm = *parsed;
+    return {};
+  };
+  if (key == "corners") return parse_shape_corners(value, shape);
+  if (key == "height") return length(shape.height_mm);
+  if (key == "size") {
+    if (parse_box(value, shape.box_mm)) return {};
+    return tl::unexpected(
+        WrongValue{"this is not a size", "write width, height and depth, as 120x180x40mm"});
+  }
+  if (key == "arc") {
+    if (parse_number(value, shape.arc_deg) && shape.arc_deg > 0 && shape.arc_deg <= 360) return {};
+    return tl::unexpected(
+        WrongValue{"this is not an angle", "write degrees above 0, at most 360, as arc=120"});
+  }
+  if (shape.kind == ShapeRequest::Kind::kBox) {
+    if (value.empty()) return tl::unexpected(WrongValue{"its file is missing", "name a picture"});
+    const auto* side = std::find(std::begin(kBoxSides), std::end(kBoxSides), key);
+    shape.sides[static_cast<std::size_t>(side - std::begin(kBoxSides))] = value;
+    return {};
+  }
+  if (key == "bottom") return length(shape.bottom_mm);
+  auto taken = length(shape.top_mm);
+  if (taken && key == "diameter") shape.bottom_mm = shape.top_mm;
+  return taken;
+}
+
 }  // namespace
 
 Result<ShapeRequest> parse_shape(const std::string& text) {
@@ -512,49 +580,25 @@ Result<ShapeRequest> parse_shape(const std::string& text) {
   } else if (parts[0] != "flat") {
     return shape_error(text, "there is no shape '" + std::string(parts[0]) + "'");
   }
-  constexpr std::string_view kSides[] = {"right", "back", "left", "top", "bottom"};
-  const bool cone = shape.kind == ShapeRequest::Kind::kCone;
-  const bool box = shape.kind == ShapeRequest::Kind::kBox;
-  const bool round = !box && !shape.flat();
+  const std::vector<std::string_view> keys = shape_keys(shape);
   for (std::size_t i = 1; i < parts.size(); ++i) {
-    const std::string_view part = parts[i];
-    const std::string_view value = part.substr(part.find('=') + 1);
-    bool good = false;
-    if (part.starts_with("corners=")) {
-      auto corners = parse_corners(commas_for_colons(value));
-      good = corners.has_value();
-      if (good) {
-        RectifyOptions cut;
-        cut.corners = *corners;
-        if (const auto valid = cut.validate(); !valid)
-          return shape_error(text, valid.error().cause);
-        shape.corners = *corners;
-      }
-    } else if (part.starts_with("height=")) {
-      good = parse_length(value, shape.height_mm);
-    } else if (box && part.starts_with("size=")) {
-      good = parse_box(value, shape.box_mm);
-    } else if (box) {
-      const auto* side =
-          std::find(std::begin(kSides), std::end(kSides), part.substr(0, part.find('=')));
-      good = side != std::end(kSides) && !value.empty();
-      if (good) shape.sides[static_cast<std::size_t>(side - std::begin(kSides))] = value;
-    } else if (round && !cone && part.starts_with("diameter=")) {
-      good = parse_length(value, shape.top_mm);
-      shape.bottom_mm = shape.top_mm;
-    } else if (cone && part.starts_with("top=")) {
-      good = parse_length(value, shape.top_mm);
-    } else if (cone && part.starts_with("bottom=")) {
-      good = parse_length(value, shape.bottom_mm);
-    } else if (round && part.starts_with("arc=")) {
-      good = parse_number(value, shape.arc_deg) && shape.arc_deg > 0 && shape.arc_deg <= 360;
+    const std::string_view key = parts[i].substr(0, parts[i].find('='));
+    const std::string quoted = "'" + std::string(parts[i]) + "'";
+    if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
+      return shape_error(text, std::string(parts[0]) + " has no '" + std::string(key) + "'",
+                         cure_of_name(key, keys));
     }
-    if (!good) return shape_error(text, "'" + std::string(part) + "' is not understood");
+    const bool valued = key.size() < parts[i].size();
+    const auto taken = parse_shape_part(key, valued ? parts[i].substr(key.size() + 1) : "", shape);
+    if (!taken) return shape_error(text, quoted + ": " + taken.error().cause, taken.error().cure);
   }
+  const bool cone = shape.kind == ShapeRequest::Kind::kCone;
   if (cone && (shape.top_mm <= 0 || shape.bottom_mm <= 0)) {
     return shape_error(text, "a cone needs its diameters at the top and at the bottom");
   }
-  if (box && shape.box_mm[0] <= 0) return shape_error(text, "a box needs its size");
+  if (shape.kind == ShapeRequest::Kind::kBox && shape.box_mm[0] <= 0) {
+    return shape_error(text, "a box needs its size");
+  }
   if (shape.height_mm > 0 && !shape.corners) {
     return shape_error(text, "a height needs corners=, whose picture has it");
   }

@@ -38,6 +38,12 @@ namespace fs = std::filesystem;
 
 using Keys = std::vector<std::string_view>;
 
+/// The cure as this file needs it: cures write values as on the command line.
+WrongValue quoted(std::string_view key, WrongValue why) {
+  why.cure += "; in this file with quotes: " + std::string(key) + " = \"...\"";
+  return why;
+}
+
 std::string place(const std::string& file, const toml::source_region& region) {
   return file + ":" + std::to_string(region.begin.line) + ":" + std::to_string(region.begin.column);
 }
@@ -79,7 +85,7 @@ class TableReader {
     MODAR_TRY(take_as<std::string>(key, R"(a length in quotes, as in "210mm")", text));
     if (text.empty()) return {};
     const auto length = parse_millimetres(text);
-    if (!length) return refused(key, "", length.error());
+    if (!length) return refused(key, "", quoted(key, length.error()));
     mm = *length;
     return {};
   }
@@ -193,7 +199,7 @@ class TableReader {
   [[nodiscard]] tl::unexpected<Error> wrong(std::string_view key,
                                             const std::string& expected) const {
     return fail(ExitCode::kInvalidInput, "project.value", at(key),
-                "'" + std::string(key) + "' in " + name_ + " has the wrong type",
+                "'" + std::string(key) + "' in " + name_ + " is not valid here",
                 "write " + expected);
   }
 
@@ -322,10 +328,13 @@ Keys keys_with_settings(Keys keys, std::optional<OptionPart> part) {
 
 Error no_toml(const std::string& path, const toml::parse_error& error) {
   constexpr std::pair<std::string_view, const char*> kCures[] = {
+      {"control characters", "close the text with \" at its end"},
       {"utf-8", "save it as UTF-8, which editors offer as an encoding"},
       {"escape", "write / for \\, or enclose the text in '...'"},
       {"','", "write numbers with a point (12.5), and quote texts; see toml.io"},
-      {"value type", "enclose texts in straight quotes: \"cover.png\""}};
+      {"value type", "enclose texts in straight quotes: \"cover.png\""},
+      {"decimal integer", "enclose values with a unit in quotes: \"120mm\""},
+      {"time:", "enclose several numbers in quotes or brackets: \"0:0:90\" or [0, 0, 90]"}};
   const auto* cure = ranges::find_if(kCures, [&](const auto& one) {
     return error.description().find(one.first) != std::string_view::npos;
   });
@@ -723,7 +732,7 @@ class ProjectReader {
     MODAR_TRY(reader.parse_scene_value(key, text));
     const auto taken = parse_scene_part(key, text, scene);
     if (taken) return {};
-    return reader.refused(key, " = " + text, taken.error());
+    return reader.refused(key, " = " + text, quoted(key, taken.error()));
   }
 
   static Result<void> read_placement(const TableReader& reader, SceneRequest& scene) {

@@ -238,6 +238,13 @@ class WrongFiles(ProgramTest):
         self.assert_fails(self.modar("bake"), 3, "web address", "curl")
         self.assertFalse((self.folder / "https:").exists())
 
+    def test_a_shape_is_refused_with_what_its_part_may_be(self):
+        for shape, *words in (("cylinder,diameter=66mm,arc=361", "'arc=361'", "at most 360"), ("cylinder,diameter=-66mm", "'diameter=-66mm'"),
+                              ("cylinder,diameter=66", "'diameter=66'", "write 66mm"), ("box,size=120x180mm", "120x180x40mm"),
+                              ("box,size=1x2x3mm,righ=good.png", "did you mean 'right'"), ("cone,diameter=3mm", "cone has no 'diameter'"),
+                              ("flat,corners=1:2:3", "eight numbers with colons"), ("box,size=1x2x3mm,top=", "'top='", "its file is missing")):
+            self.assert_fails(self.modar("bake", f"good.png:shape={shape}", "-o", "o.modar"), 1, "cli.shape", *words)
+
     def test_a_decimal_comma_is_named_with_the_point(self):
         for scene, point in (("height=12,5cm", "height=12.5cm"), ("scale=0,8", "scale=0.8"), ("turn=12,5", "turn=12.5"), ("offset=0:0:2,5cm", "offset=0:0:2.5cm"),
                              ("up=z,height=1,5cm,turn=9", "height=1.5cm")):
