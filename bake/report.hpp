@@ -85,17 +85,23 @@ inline constexpr std::array kDefectNames = {
     "degenerate", "duplicates", "non_manifold_edges", "touching_vertices", "winding", "islands",
     "holes",      "support"};
 inline constexpr std::size_t kDefects = kDefectNames.size();
-/// For people, after a number.
-inline const char* defect_words(Defect defect) {
-  constexpr std::array<const char*, kDefects> kWords = {"triangles without area",
-                                                        "repeated triangles",
-                                                        "non-manifold edges",
-                                                        "vertices where parts touch",
-                                                        "changes of winding",
-                                                        "small islands",
-                                                        "small holes",
-                                                        "support surface"};
-  return kWords[static_cast<std::size_t>(defect)];
+/// For people: "1 small island".
+inline std::string defect_words(Defect defect, std::uint64_t count) {
+  struct Words {
+    const char* one;
+    const char* many;
+  };
+  constexpr std::array<Words, kDefects> kWords = {
+      {{"triangle without area", "triangles without area"},
+       {"repeated triangle", "repeated triangles"},
+       {"non-manifold edge", "non-manifold edges"},
+       {"vertex where parts touch", "vertices where parts touch"},
+       {"change of winding", "changes of winding"},
+       {"small island", "small islands"},
+       {"small hole", "small holes"},
+       {"support surface", "support surfaces"}}};
+  const Words& words = kWords[static_cast<std::size_t>(defect)];
+  return std::to_string(count) + " " + (count == 1 ? words.one : words.many);
 }
 
 struct DefectCount {

@@ -394,9 +394,8 @@ std::string repair_words(const MeshDefects& repair) {
     const DefectCount& one = repair.counts[d];
     if (one.count == 0) continue;
     char text[96];
-    std::snprintf(text, sizeof text, "%s%llu %s (area %.3g)", words.empty() ? "repaired: " : ", ",
-                  static_cast<unsigned long long>(one.count), defect_words(static_cast<Defect>(d)),
-                  one.area);
+    std::snprintf(text, sizeof text, "%s%s (area %.3g)", words.empty() ? "repaired: " : ", ",
+                  defect_words(static_cast<Defect>(d), one.count).c_str(), one.area);
     words += text;
   }
   return words.empty() ? "nothing to repair" : words;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "bake/mesh/repair/repair.hpp"
+#include "formats/base/ranges.hpp"
 #include "tests/mesh/stages.hpp"
 
 namespace modar {
@@ -250,6 +251,16 @@ TEST(Repair, RemovesDebrisAndKeepsParts) {
   EXPECT_NEAR(result.done.of(Defect::kIsland).area, 0.125 + 0.375 + 0.25 * std::sqrt(3) / 2, 1e-3);
   EXPECT_EQ(result.mesh.triangles.size(), shape.faces.size() - 5);
   EXPECT_GT(shape.faces.size(), with_debris);
+}
+
+TEST(Repair, WarnsOfAnIslandThatMakesTheModelSmall) {
+  for (const double x : {100.0, 400.0}) {
+    Shape shape = pillow(60);
+    const int a = shape.at(x, 0, 0), b = shape.at(x + 0.5, 0, 0), c = shape.at(x, 0.5, 0);
+    shape.faces.push_back({a, b, c});
+    const Repaired result = repair(shape);
+    EXPECT_EQ(ranges::count(result.said, "model.stray", &Diagnostic::id), x > 200 ? 1 : 0) << x;
+  }
 }
 
 TEST(Repair, KeepsIslandsThatAreMuchOfTheModel) {

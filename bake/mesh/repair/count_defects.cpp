@@ -1,11 +1,13 @@
 // Counts what repair_model() would change, at a small part of its cost: the fan of a position shows
 // whether it is clean, and only edges between the others are examined.
+#include <cmath>
 #include <map>
 #include <memory>
 #include <string>
 
 #include "bake/mesh/repair/repair.hpp"
 #include "bake/mesh/repair/surface.hpp"
+#include "formats/base/shortest_number.hpp"
 
 namespace modar {
 namespace {
@@ -36,9 +38,18 @@ class Counter {
     Components components(surface_, open_);
     bool many = false;
     const std::vector<bool> islands = components.islands(many);
+    PointBox whole;
+    PointBox rest;
     for (std::size_t p = 0; p < islands.size(); ++p) {
+      const PointBox& box = components.at(p).box;
+      for (PointBox* each : {&whole, islands[p] ? nullptr : &rest}) {
+        if (each == nullptr) continue;
+        each->add(box.low);
+        each->add(box.high);
+      }
       if (islands[p]) ++defects_.of(Defect::kIsland).count;
     }
+    if (rest.diagonal() > 0) spread_ = whole.diagonal() / rest.diagonal();
     const std::map<std::uint32_t, Loop> loops = open_loops(surface_, open_);
     for (const auto& [position, loop] : loops) {
       const std::uint32_t part = components.of(position);
@@ -47,6 +58,9 @@ class Counter {
     }
     defects_.backs = seen_backs(surface_, components, loops, turned_, materials, viewer);
   }
+
+  /// The model's diagonal with its small islands, times that without them.
+  [[nodiscard]] double spread() const { return spread_; }
 
  private:
   void count_edge(std::span<const std::uint32_t> edge) {
@@ -77,15 +91,27 @@ class Counter {
   std::vector<std::uint32_t> open_;    // half-edges
   std::vector<std::uint32_t> turned_;  // of changes of winding
   Fans fans_;
+  double spread_ = 1;
 };
 
+/// Times that islands may enlarge a model's diagonal. Higher: models get smaller unsaid. [1.5, 4]
+constexpr double kMostSpread = 2;
+
 /// One line that names the option, or what it left.
-void report_defects(const MeshDefects& defects, bool repaired, Report& report) {
+void report_defects(const MeshDefects& defects, bool repaired, double spread, Report& report) {
+  if (spread > kMostSpread) {
+    report.diagnostics.push_back(
+        {"model.stray", DiagnosticSeverity::kWarning, defects.model, 0,
+         defect_words(Defect::kIsland, defects.counts[std::size_t(Defect::kIsland)].count) +
+             " far from the rest: the model is " + shortest_text(std::round(spread)) +
+             " times as large as without, so that the rest is shown small",
+         "--repair removes them"});
+  }
   std::string list;
   for (std::size_t d = 0; d < kDefects; ++d) {
     if (defects.counts[d].count == 0) continue;
-    list += (list.empty() ? "" : ", ") + std::to_string(defects.counts[d].count) + " " +
-            defect_words(static_cast<Defect>(d));
+    list +=
+        (list.empty() ? "" : ", ") + defect_words(static_cast<Defect>(d), defects.counts[d].count);
   }
   if (list.empty()) return;
   report.diagnostics.push_back({"model.defects", DiagnosticSeverity::kInfo, defects.model, 0,
@@ -109,9 +135,10 @@ MeshDefects count_defects(const TriMesh& mesh, bool repaired, const glm::dvec3& 
     around = std::make_unique<Around>(counted.surface());
     clean = clean_positions(counted.surface(), *around);
   }
-  Counter(counted.surface(), *around, clean, defects)
-      .run({mesh.triangle_material.data(), mesh.triangle_material.size()}, viewer);
-  report_defects(defects, repaired, report);
+  const Faces surface = counted.surface();
+  Counter counter(surface, *around, clean, defects);
+  counter.run({mesh.triangle_material.data(), mesh.triangle_material.size()}, viewer);
+  report_defects(defects, repaired, counter.spread(), report);
   timer.done(mesh.triangles.size(), 0);
   return defects;
 }
