@@ -101,8 +101,8 @@ std::string name_of(const std::string& path) {
   return std::filesystem::path(path).stem().string();
 }
 
-/// Before the first one is packed, which takes long. Errors: kInvalidInput "ship.name",
-/// "ship.bad-bundle"; those of reading them.
+/// Before the first one is packed, which takes long. Errors: kUsage "ship.name"; those of
+/// reading them.
 Result<void> check_bundles(const PublishRequest& request) {
   std::set<std::string> names;
   for (const std::string& path : request.bundles) {
@@ -112,7 +112,7 @@ Result<void> check_bundles(const PublishRequest& request) {
                   "rename the file");
     }
     if (!names.insert(lower_case(name_of(path))).second) {
-      return fail(ExitCode::kInvalidInput, "ship.name", path,
+      return fail(ExitCode::kUsage, "ship.name", path,
                   "two bundles have this name, or names that differ by case only",
                   "rename one: a phone's storage may ignore case");
     }
@@ -230,6 +230,11 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
                 "name bundles, or --drop NAME");
   }
   MODAR_TRY(check_bundles(request));
+  std::error_code absent;
+  if (request.bundles.empty() && !std::filesystem::exists(request.folder, absent)) {
+    return fail(ExitCode::kUsage, "ship.nothing", request.folder, "there is no release in it",
+                "name the folder of a release, or bundles for a new one");
+  }
   MODAR_ASSIGN(const auto folder, ReleaseFolder::open(request.folder, request.force));
   MODAR_TRY(folder.check_signer(key.public_key));
   MODAR_ASSIGN(const auto newest, folder.newest());
@@ -242,6 +247,10 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
   done.release.fresh_days = request.fresh_days.value_or(newest ? newest->fresh_days : 0);
   MODAR_ASSIGN(done.release.bundles, kept_bundles(before, request));
   MODAR_TRY(check_devices(request, done.release.bundles));
+  if (request.bundles.empty() && done.release.bundles.empty()) {
+    return fail(ExitCode::kUsage, "ship.nothing", request.folder, "no bundle would be left in it",
+                "publish another bundle with --drop, or remove the folder");
+  }
   ObjectLedger ledger(request.folder);
   MODAR_TRY(add_bundles(request, folder, ledger, done, report));
   for (const auto& [name, devices] : request.devices) {
@@ -261,7 +270,7 @@ Result<PublishReport> publish(const PublishRequest& request, const SecretKey& ke
   }
   if (const auto readable = parse_release(release_text(done.release)); !readable) {
     return fail(
-        ExitCode::kInvalidInput, "ship.name", request.folder, readable.error().cause,
+        ExitCode::kUsage, "ship.name", request.folder, readable.error().cause,
         "name each bundle's file with letters, digits, '.', '_' and '-', no two of them equal");
   }
   if (request.dry_run) return done;

@@ -46,7 +46,7 @@ struct PublishReport {
 /// A release is the whole set: bundles that the request does not name are kept from the newest.
 /// Validates each bundle, writes its pieces, then the signed document, then `latest`: the release
 /// before stays valid at every moment.
-/// Errors: kInvalidInput "ship.bad-bundle", "ship.name"; kUsage "ship.version", "ship.key",
+/// Errors: kInvalidInput "ship.bad-bundle"; kUsage "ship.name", "ship.version", "ship.key",
 /// "ship.drop"; kIo, "ship.damaged" (an object of a kept bundle); kExitLocked.
 Result<PublishReport> publish(const PublishRequest& request, const SecretKey& key, Report& report);
 

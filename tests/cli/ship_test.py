@@ -309,14 +309,23 @@ class Publish(ShipTest):
         self.fetch_json()
         self.assert_installed(self.shop.new)
 
+    def test_the_last_bundle_stays(self):
+        drop = ("ship", "publish", "--key", self.shop.key, "--drop", self.shop.old.stem, "--to")
+        self.assert_fails(self.modar(*drop, self.folder / "absent"), 1, "ship.nothing", "no release")
+        self.assertFalse((self.folder / "absent").exists())
+        self.publish(self.shop.old)
+        self.assert_fails(self.modar(*drop, self.site), 1, "ship.nothing", "no bundle would be left")
+        done = self.modar(*drop, self.site, self.shop.new)
+        self.assertNotIn("ship.nothing", done.stderr)
+
     def test_names_that_differ_by_case_only_are_refused(self):
         other = self.folder / "Museum.modar"
         shutil.copy(self.shop.old, other)
         done = self.modar("ship", "publish", self.shop.old, other, "--to", self.site, "--key", self.shop.key)
-        self.assert_fails(done, 3, "ship.name", "case")
+        self.assert_fails(done, 1, "ship.name", "case")
         self.publish(self.shop.old)
         done = self.modar("ship", "publish", other, "--to", self.site, "--key", self.shop.key)
-        self.assert_fails(done, 3, "ship.name", "case")
+        self.assert_fails(done, 1, "ship.name", "case")
 
     def test_patterns_need_no_text_on_the_way(self):
         report = self.publish(self.shop.pattern)
