@@ -174,7 +174,9 @@ Outcome Attempts::again(Transfer& transfer, const std::string& cause) {
   transfer.fruitless = progress ? 0 : transfer.fruitless + 1;
   if (transfer.fruitless >= options_.attempts) {
     transfer.error = {kExitNetwork, "fetch.network", address_of(transfer),
-                      cause + ", " + std::to_string(transfer.fruitless) + " times in a row",
+                      transfer.fruitless == 1
+                          ? cause
+                          : cause + ", " + std::to_string(transfer.fruitless) + " times in a row",
                       "run modar-fetch again: it resumes where it stopped"};
     return Outcome::kFailed;
   }

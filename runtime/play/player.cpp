@@ -445,7 +445,7 @@ Result<int> Player::finish(const PipelineCounts& counts) {
   MODAR_TRY(finish_outputs(!interrupted));
   if (interrupted) {
     return fail(ExitCode::kIo, "play.interrupted", input_of(options_),
-                "the run was interrupted after " + std::to_string(stats_.frames()) + " frames",
+                "the run was interrupted after frame " + std::to_string(stats_.frames()),
                 "the output is complete for these frames; run it again for all of them");
   }
   return golden_ && !golden_->good() ? kExitDifferent : 0;

@@ -174,7 +174,7 @@ Result<void> play_turntable(const PlayOptions& options, const BundleView& bundle
       MODAR_TRY(file.intact());
       if (was_interrupted()) {
         return fail(ExitCode::kIo, "play.interrupted", options.out,
-                    "the run was interrupted after " + std::to_string(turn.frame) + " frames",
+                    "the run was interrupted after frame " + std::to_string(turn.frame),
                     "start it again");
       }
       turn.render_ms = ms_since(before);

@@ -320,7 +320,7 @@ class Play(ProgramTest):
         process.terminate()
         self.assertEqual(process.wait(), 2)
         watch.cancel()
-        self.assertIn(b"interrupted after 1 frames", process.stderr.read())
+        self.assertIn(b"interrupted after frame 1", process.stderr.read())
         self.assertEqual(json.loads(process.stdout.read())["summary"]["frames"], 1)
         self.assertEqual(len((self.folder / "kept" / "frames.jsonl").read_text().splitlines()), 2)
         self.assertTrue((self.folder / "kept" / "index.html").exists(), "the played part is kept")
