@@ -517,6 +517,7 @@ PatchFit linearise(const TrackedPattern& pattern, const FrameView& frame, const 
   const PlaneMap map = map_of_pose(pattern, frame.camera, pose);
   PatchFit fit;
   fit.level = view.at.frame_level;
+  frame.patches.count(view.patches.size() / view.stride);
   for (std::size_t i = 0; i < view.patches.size(); i += view.stride) {
     const Patch& patch = view.patches[i];
     PatchObservation seen;
@@ -798,6 +799,7 @@ PatchFit align_map(const TrackedPattern& pattern, const FrameView& frame, int fr
   k[0][0] = k[1][1] = camera.fx;
   k[2] = {camera.cx, camera.cy, 1.0};
   for (int step = 0; step <= steps; ++step) {
+    frame.patches.count(view.patches.size());
     MapEquations equations = map_equations(view, camera, map, step == 0 ? kTukeyFirst : kTukey);
     fit = equations.fit;
     Vector8 e;

@@ -82,6 +82,9 @@ class PatchCache {
   [[nodiscard]] std::span<const PatchLinearisation> last_linearisations() const {
     return linearisations_;
   }
+  /// Patches compared with frames so far: most of the work of a refinement.
+  [[nodiscard]] std::int64_t compared() const { return compared_; }
+  void count(std::size_t patches) { compared_ += static_cast<std::int64_t>(patches); }
 
  private:
   struct Slot {
@@ -94,6 +97,7 @@ class PatchCache {
   std::vector<Patch> scratch_;
   std::vector<PatchLinearisation> linearisations_;
   std::uint64_t uses_ = 0;
+  std::int64_t compared_ = 0;
 };
 
 /// The motion blur of a frame: during the exposure each point moves by this share of its way from

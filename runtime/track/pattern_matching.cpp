@@ -489,9 +489,8 @@ void put_code(const Code& code, std::size_t i, std::uint8_t* blocks) {
 }
 
 std::size_t position_of(std::span<const std::uint8_t> distances, int wanted) {
-  std::size_t at = 0;
-  while (at + 1 < distances.size() && distances[at] != wanted) ++at;
-  return at;
+  const void* at = std::memchr(distances.data(), wanted, distances.size());
+  return static_cast<std::size_t>(static_cast<const std::uint8_t*>(at) - distances.data());
 }
 
 /// Where a pattern's features of a polarity begin and end.
@@ -538,6 +537,16 @@ bool CodeIndex::build(std::int64_t& work) {
   owners_ = {};
   nearest_ = {};
   return true;
+}
+
+std::size_t CodeIndex::compared() const {
+  std::size_t most = 1;
+  for (const Group& group : groups_) {
+    if (group.starts.empty()) continue;
+    const std::size_t words = group.starts.size() - 1;
+    most = std::max(most, words + kProbes * group.owners.size() / words);
+  }
+  return most;
 }
 
 /// A group's codes and words.
@@ -639,14 +648,44 @@ CodeIndex::Support CodeIndex::largest_agreement(std::uint32_t last, std::size_t 
     }
     if (agree > most.votes) most = {agree, votes_[i].match};
   }
+  if (most.votes > 2) fit_place(last, most.place);
   return most;
 }
 
-std::span<const CodeIndex::Support> CodeIndex::vote(std::span<const TrackerFeature> features) {
+/// From the place of one vote to that of all that agree with it: the affine map of their places,
+/// kept near that of the one where these are few or in a line.
+void CodeIndex::fit_place(std::uint32_t last, FeatureMatch& place) const {
+  constexpr double kOwn = 32.0 * 32.0;  // square pixels of the places that weigh as much as its own
+  double count = 0.0;
+  glm::dvec2 pattern{0.0};
+  glm::dvec2 ideal{0.0};
+  glm::dmat2 both(0.0);
+  glm::dmat2 square(0.0);
+  for (std::uint32_t i = last; i != kNone; i = votes_[i].previous) {
+    const FeatureMatch& vote = votes_[i].match;
+    if (!agrees(place, vote)) continue;
+    count += 1.0;
+    pattern += vote.pattern;
+    ideal += vote.ideal;
+    both += glm::outerProduct(vote.ideal, vote.pattern);
+    square += glm::outerProduct(vote.pattern, vote.pattern);
+  }
+  pattern /= count;
+  ideal /= count;
+  both += kOwn * place.affine - count * glm::outerProduct(ideal, pattern);
+  square += glm::dmat2(kOwn) - count * glm::outerProduct(pattern, pattern);
+  place.affine = both * glm::inverse(square);
+  place.pattern = pattern;
+  place.ideal = ideal;
+}
+
+std::span<const CodeIndex::Support> CodeIndex::vote(std::span<const TrackerFeature> features,
+                                                    std::size_t first, std::size_t every) {
   std::fill(support_.begin(), support_.end(), Support{});
   std::fill(last_.begin(), last_.end(), kNone);
   std::uint32_t count = 0;
-  for (const TrackerFeature& feature : features.first(std::min(features.size(), votes_.size()))) {
+  for (std::size_t i = first; i < features.size() && count < votes_.size(); i += every) {
+    const TrackerFeature& feature = features[i];
     const bool dark = feature.dark != 0;
     const Group& group = groups_[dark ? 1 : 0];
     if (group.starts.empty()) continue;

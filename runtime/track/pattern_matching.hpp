@@ -147,8 +147,12 @@ class CodeIndex {
     std::uint16_t votes = 0;  ///< features that agree on one place,
     FeatureMatch place;       ///< given by one of them
   };
-  /// One per pattern, valid until the next call.
-  std::span<const Support> vote(std::span<const TrackerFeature> features);
+  /// One per pattern, valid until the next call. Of the features every n-th votes, from `first`.
+  std::span<const Support> vote(std::span<const TrackerFeature> features, std::size_t first,
+                                std::size_t every);
+  [[nodiscard]] std::span<const Support> support() const { return support_; }
+  /// Codes that a feature is compared with, about.
+  [[nodiscard]] std::size_t compared() const;
 
  private:
   /// Words whose codes a feature is compared with. More find votes that the nearest word misses,
@@ -171,6 +175,7 @@ class CodeIndex {
   std::array<std::uint32_t, kProbes> nearest_words(const Group& group, const Code& code);
   std::uint32_t nearest_owner(const Group& group, const Code& code);
   [[nodiscard]] Support largest_agreement(std::uint32_t last, std::size_t count) const;
+  void fit_place(std::uint32_t last, FeatureMatch& place) const;
 
   std::span<const TrackedPattern> patterns_;
   const Kernels& kernels_;

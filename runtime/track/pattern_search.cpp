@@ -70,6 +70,19 @@ constexpr std::ptrdiff_t kMaxLikely = 4;
 constexpr std::size_t kGuesses = 2;
 // Patterns matched in all, the one whose turn it is included. Not measured.
 constexpr std::size_t kMatched = 3;
+// Votes that agree from which such a place is matched. Higher loses small patterns.
+constexpr std::uint16_t kLeastVotes = 2;
+// Places matched in a frame. More find patterns sooner and take time.
+constexpr std::size_t kPlaces = 3;
+// Codes that the voting features of a frame are compared with, at most: with more, every n-th
+// feature votes, others in the next search.
+constexpr std::size_t kVoting = 400'000;
+// Instructions after the votes of many from which a search tries nothing more. Higher finds more
+// small or covered prints, and takes time in clutter.
+constexpr std::int64_t kMostWork = 12'000'000;
+constexpr std::int64_t kPatchCost = 3500;  // instructions, to compare it with the frame
+// Failed places of a pattern that count against its votes, at most.
+constexpr std::uint8_t kMostFailures = 8;
 
 // Patterns not found until small places are looked for. Lower takes time.
 constexpr int kSmallTurns = 7;
@@ -88,13 +101,25 @@ std::size_t count_of_copies(std::span<const TrackedPattern> patterns) {
   return count;
 }
 
-/// Whether `other` is within the outline that a pattern has by one vote, with a margin.
-bool covers(const TrackedPattern& pattern, const FeatureMatch& place, const FeatureMatch& other) {
-  const glm::dvec2 size(pattern.width(), pattern.height());
-  const glm::dvec2 at =
-      (glm::inverse(place.affine) * (other.ideal - place.ideal) + place.pattern) / size;
-  return std::min(at.x, at.y) > -kMargin && std::max(at.x, at.y) < 1.0 + kMargin;
-}
+/// The outline that a pattern has by one vote, with a margin.
+class VotedPlace {
+ public:
+  VotedPlace(const TrackedPattern& pattern, const FeatureMatch& place)
+      : size_(pattern.width(), pattern.height()),
+        from_(place.pattern),
+        to_(place.ideal),
+        back_(glm::inverse(place.affine)) {}
+  [[nodiscard]] bool covers(glm::dvec2 other) const {
+    const glm::dvec2 at = (back_ * (other - to_) + from_) / size_;
+    return std::min(at.x, at.y) > -kMargin && std::max(at.x, at.y) < 1.0 + kMargin;
+  }
+
+ private:
+  glm::dvec2 size_;
+  glm::dvec2 from_;
+  glm::dvec2 to_;
+  glm::dmat2 back_;
+};
 
 }  // namespace
 
@@ -109,7 +134,17 @@ bool covers(const TrackedPattern& pattern, const FeatureMatch& place, const Feat
                max_codes(patterns)) {
   selected_.reserve(patterns.size());
   has_votes_.resize(patterns.size());
+  failures_.resize(patterns.size());
+  if (many()) near_.reserve(matcher_.max_features());
   known_.reserve(count_of_copies(patterns));
+}
+
+bool PatternSearch::many() const {
+  return patterns_.size() >= kMany;
+}
+
+bool PatternSearch::exhausted() const {
+  return many() && spent_ + kPatchCost * patches_.compared() > kMostWork;
 }
 
 /// Leaves in selected_ the patterns to match in full; the first likely_ of them are probably there.
@@ -120,14 +155,16 @@ void PatternSearch::select(std::span<const TrackerFeature> features,
     if (priorities[i] != SearchPriority::kNone) selected_.push_back(i);
   }
   likely_ = selected_.size();
+  if (many()) return select_places(features);
   if (selected_.size() <= kMatched) return;
-  const std::span<const CodeIndex::Support> support = index_->vote(features);
+  const std::span<const CodeIndex::Support> support = index_->vote(features, 0, 1);
   for (const std::uint32_t i : selected_) {
     const CodeIndex::Support& one = support[i];
     has_votes_[i] = one.votes >= kMinVotes ? 1 : 0;
     for (std::size_t k = 0; k < support.size() && has_votes_[i] != 0; ++k) {
       const bool more = support[k].votes > kShadowRatio * one.votes;
-      if (more && covers(patterns_[k], support[k].place, one.place)) has_votes_[i] = 0;
+      if (more && VotedPlace(patterns_[k], support[k].place).covers(one.place.ideal))
+        has_votes_[i] = 0;
     }
   }
   const auto has_votes = [&](std::uint32_t i) { return has_votes_[i] != 0; };
@@ -152,6 +189,49 @@ void PatternSearch::select(std::span<const TrackerFeature> features,
   turn_ = (*next + 1) % static_cast<std::uint32_t>(patterns_.size());
   std::iter_swap(turn, next);
   selected_.erase(turn + 1, selected_.end());
+}
+
+/// Of many patterns: leaves in selected_ the few that the index places in the frame, those with
+/// most votes first, and those lost a moment ago.
+void PatternSearch::select_places(std::span<const TrackerFeature> features) {
+  const std::size_t every = (features.size() * index_->compared() + kVoting - 1) / kVoting;
+  const auto support = index_->vote(features, turn_++ % every, every);
+  const auto weight = [&](std::uint32_t i) {
+    const int votes = support[i].votes;
+    const int lost = priorities_[i] == SearchPriority::kFirst ? 1 : 0;
+    return votes < kLeastVotes ? lost : 1 + lost + std::max(votes - failures_[i], 0);
+  };
+  std::erase_if(selected_, [&](std::uint32_t i) { return weight(i) == 0; });
+  const std::size_t count = std::min(selected_.size(), kPlaces);
+  std::partial_sort(selected_.begin(), selected_.begin() + static_cast<std::ptrdiff_t>(count),
+                    selected_.end(), [&](std::uint32_t a, std::uint32_t b) {
+                      return weight(a) != weight(b) ? weight(a) > weight(b) : a < b;
+                    });
+  selected_.resize(count);
+  for (std::uint8_t& failures : failures_) {
+    if (failures > 0) --failures;
+  }
+  likely_ = 0;
+}
+
+/// The features in the place that the index gave the pattern, those that are not spare first;
+/// all where it gave none. count: becomes the number of those that are not spare.
+std::span<const TrackerFeature> PatternSearch::features_there(const TrackedPattern& pattern,
+                                                              std::size_t& count) {
+  const std::span<const TrackerFeature> found = extractor_->found();
+  count = static_cast<std::size_t>(candidates_->features);
+  if (!many() || index_->support()[selected_[at_]].votes < kLeastVotes) return found;
+  const VotedPlace there(pattern, index_->support()[selected_[at_]].place);
+  std::size_t plain = 0;
+  near_.clear();
+  for (const bool spare : {false, true}) {
+    for (const TrackerFeature& each : spare ? found.subspan(count) : found.first(count)) {
+      if (there.covers({each.x, each.y})) near_.push_back(each);
+    }
+    if (!spare) plain = near_.size();
+  }
+  count = plain;
+  return near_;
 }
 
 bool PatternSearch::prepare(std::int64_t work) {
@@ -210,8 +290,10 @@ bool PatternSearch::advance(std::int64_t work) {
   for (bool first = true;; first = false) {
     const std::int64_t cost = cost_of_step();
     if (!first && work < std::max<std::int64_t>(cost, 1)) return false;
+    const std::int64_t before = work;
     work -= cost;
     if (!step(work)) return true;
+    spent_ += before - cost - work;
   }
 }
 
@@ -241,10 +323,12 @@ bool PatternSearch::step(std::int64_t& work) {
   }
   if (stage_ == Stage::kSelect) {
     select(extractor_->found(), priorities_);
+    spent_ = -kPatchCost * patches_.compared();
     times.match += clock.lap();
     stage_ = Stage::kMatch;
   }
   if (at_ == selected_.size() || (at_ >= likely_ && found_)) return false;
+  if (stage_ == Stage::kMatch && next_feature_ == 0 && exhausted()) return false;
   const TrackedPattern& pattern = patterns_[selected_[at_]];
   const FrameView frame{camera_, extractor_->pyramid(), kernels_, patches_};
   const bool matching = stage_ < Stage::kStart;
@@ -276,8 +360,8 @@ bool PatternSearch::step(std::int64_t& work) {
 
 void PatternSearch::match_features(const TrackedPattern& pattern, std::int64_t& work) {
   if (features_ == Features::kSpare && !extractor_->extend_spare(work)) return;
-  const std::span<const TrackerFeature> features = extractor_->found();
-  const auto count = static_cast<std::size_t>(candidates_->features);
+  std::size_t count = 0;
+  const std::span<const TrackerFeature> features = features_there(pattern, count);
   const std::size_t ends[] = {(count + 1) / 2, count, features.size()};
   const std::size_t end = ends[static_cast<std::size_t>(features_)];
   if (!matcher_.match(pattern, features, count, end, next_feature_, work)) return;
@@ -343,7 +427,7 @@ void PatternSearch::conclude(const TrackedPattern& pattern, const FrameView& fra
   // Half of the features place a pattern that nothing hides as well as all of them, in 36 instead
   // of 49 million instructions (scripts/foreign.sh budget); else what they found counts for
   // nothing.
-  if (features_ == Features::kHalf && !best_.unoccluded) {
+  if (features_ == Features::kHalf && !best_.unoccluded && !exhausted()) {
     features_ = Features::kAll;
     return;
   }
@@ -357,7 +441,7 @@ void PatternSearch::conclude(const TrackedPattern& pattern, const FrameView& fra
   // Small patterns have too few of the frame's features: of those at 2 to 5 % of the frame, 41 %
   // were found without the spare ones, and 67 % with them; of those covered to 70 %, 83 and 90 %
   // were right.
-  if (candidate.reason != Reason::kVisible && features_ == Features::kAll) {
+  if (candidate.reason != Reason::kVisible && features_ == Features::kAll && !exhausted()) {
     features_ = Features::kSpare;
     return;
   }
@@ -365,6 +449,8 @@ void PatternSearch::conclude(const TrackedPattern& pattern, const FrameView& fra
   found_ = found_ || candidate.reason == Reason::kVisible;
   candidate.place = place_;
   place_ = {};
+  if (many() && !found_ && failures_[selected_[at_]] < kMostFailures)
+    failures_[selected_[at_]] += 2;
   if (candidate.reason == Reason::kVisible && search_next_copy(pattern, frame)) return;
   ++at_;
   next_feature_ = 0;
@@ -430,7 +516,7 @@ void PatternSearch::note_place(const TrackedPattern& pattern) {
 void PatternSearch::next_hypothesis() {
   const DetectionCandidate& candidate = candidates_->patterns[selected_[at_]];
   stage_ = Stage::kMap;
-  if (hypothesis_ == hypotheses_.size() || best_.unoccluded) return;
+  if (hypothesis_ == hypotheses_.size() || best_.unoccluded || exhausted()) return;
   const int inliers = hypotheses_[hypothesis_].inliers;
   if (inliers < kMinInliers) return;
   if (candidate.reason == Reason::kVisible && 2 * inliers < candidate.inliers) return;
@@ -480,7 +566,7 @@ PatternSearch::PoseCandidate PatternSearch::refine_start(const TrackedPattern& p
     const double after = reprojection_rms(camera_, now.pose, points);
     if (after > kWrongRms * (before + 1.0)) now.score = 0;
     if (radius == SearchRadius::kNear || now.score > best.score) best = now;
-    if (best.finest && !best.inconsistent) break;
+    if ((best.finest && !best.inconsistent) || exhausted()) break;
   }
   const bool boxed = best.refined && !pattern.surface.faces().empty();
   return boxed ? ask_other_faces(pattern, frame, best) : best;

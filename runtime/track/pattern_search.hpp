@@ -81,6 +81,12 @@ class PatternSearch {
 
  private:
   void select(std::span<const TrackerFeature> features, std::span<const SearchPriority> priorities);
+  /// Whether the index alone says which patterns are matched.
+  [[nodiscard]] bool many() const;
+  /// Whether a search among many has cost as much as a frame may.
+  [[nodiscard]] bool exhausted() const;
+  void select_places(std::span<const TrackerFeature> features);
+  std::span<const TrackerFeature> features_there(const TrackedPattern& pattern, std::size_t& count);
   /// What advance() does next.
   enum class Stage : std::uint8_t {
     kFeatures,
@@ -148,6 +154,8 @@ class PatternSearch {
   bool ready_ = false;  ///< the index, if there is one
   std::vector<std::uint32_t> selected_;
   std::vector<std::uint8_t> has_votes_;  ///< by pattern
+  std::vector<std::uint8_t> failures_;   ///< by pattern: its places that showed it not, of late
+  std::vector<TrackerFeature> near_;     ///< in the place that the index gave the pattern
   std::size_t likely_ = 0;               ///< the first of selected_, which are always matched
   std::uint32_t turn_ = 0;               ///< the pattern whose turn is next
   std::vector<KnownCopy> known_;         ///< those of the caller, and those found
@@ -157,6 +165,7 @@ class PatternSearch {
   std::span<const SearchPriority> priorities_;
   DetectionCandidates* candidates_ = nullptr;
   Stage stage_ = Stage::kFeatures;
+  std::int64_t spent_ = 0;        ///< instructions
   std::size_t at_ = 0;            ///< of selected_
   bool found_ = false;            ///< one of them
   std::size_t next_feature_ = 0;  ///< to match

@@ -120,7 +120,8 @@ CellGrid::CellGrid(const TrackedPattern& pattern, const PlaneMap& map,
       scale_(std::max(scale_of(pattern, map), 1e-6)) {}
 
 double CellGrid::spread(int cell) const {
-  const bool fine = cell < kCells && (pattern_.fine_cells >> cell & 1) != 0;
+  if (!pattern_.fine_cells) pattern_.fine_cells = fine_cells(pattern_);
+  const bool fine = cell < kCells && (*pattern_.fine_cells >> cell & 1) != 0;
   return spread_from(fine ? kFootprint : 1.0);
 }
 

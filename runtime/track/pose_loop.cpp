@@ -125,8 +125,10 @@ PoseLoop::~PoseLoop() = default;
                 "the bundle holds no pattern with a record for this loop",
                 "bake it with a pattern");
   }
-  for (TrackedPattern& print : state->patterns)
+  for (TrackedPattern& print : state->patterns) {
     print.copies = copies_of(bundle, print.index, options.max_instances);
+    if (state->patterns.size() < tracker::kMany) print.fine_cells = fine_cells(print);
+  }
   state->add_copies();
   state->tracks.resize(state->patterns.size());
   state->known.reserve(state->patterns.size());
@@ -531,6 +533,7 @@ void PoseLoop::State::accept(std::size_t print, const DetectionCandidate& candid
     if (resolve_overlap(i, detection, result)) {
       if (!track.verified) verification.reason = before.last_reason;
       show(i, verification, detection, result);
+      search->found();
       return;
     }
     reason = Reason::kOtherPrint;

@@ -216,6 +216,7 @@ void add_points(const Camera& camera, const Pose& pose, const PlanePoints& point
 void add_patches(const TrackedPattern& pattern, const FrameView& frame, const PatchView& view,
                  const Pose& pose, const Matrix6& covariance, PoseInformation& sum) {
   if (view.patches.empty()) return;  // the pattern's image has no such level
+  frame.patches.count(view.patches.size() / view.stride);
   const PlaneMap map = map_of_pose(pattern, frame.camera, pose);
   const double shrink = 1.0 / static_cast<double>(1 << view.at.frame_level);
   const double grown = static_cast<double>(1 << view.at.pattern_level) * shrink;

@@ -93,11 +93,17 @@ glm::vec3 direction_of(const Pose& pose) {
       prints_(count_of_prints(patterns)),
       known_camera_(known_camera),
       evidence_(patterns.size()),
+      regular_(patterns.size()),
       relations_(prints_ * prints_),
       mirrors_(patterns.size(), {Mirror{true}, Mirror{false}}) {
-  for (const TrackedPattern& pattern : patterns) {
-    regular_.push_back(pattern.surface.flat() && regular(pattern) ? 1 : 0);
-  }
+  for (std::size_t i = 0; prints_ < kMany && i < patterns.size(); ++i) is_regular(i);
+}
+
+bool PrintVerifier::is_regular(std::size_t pattern) {
+  std::optional<bool>& known = regular_[pattern];
+  const TrackedPattern& print = patterns_[pattern];
+  if (!known) known = print.surface.flat() && regular(print);
+  return *known;
 }
 
 /// kFlip bits of a cell. If the mirror image of the cell is inside the outline, pattern and mirror
@@ -197,7 +203,7 @@ void PrintVerifier::look(std::size_t pattern, const FrameView& frame, const Trac
     const std::uint32_t at = seen.next_cell * kCellStride % kCells;
     update(pattern, grid, from, static_cast<int>(at), seen.cells[at]);
   }
-  const bool all = count == kCells && regular_[pattern] != 0;
+  const bool all = count == kCells && is_regular(pattern);
   seen.details.look(print, map, frame.pyramid, from,
                     all ? PrintDetails::kDetailCells : kDetailsOfFrame, all);
   if (all) seen.at_large = lacks_detail(seen);

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -93,6 +94,7 @@ class PrintVerifier {
   std::int32_t find_actual_pattern(std::size_t pattern, const FrameView& frame, const Track& track,
                                    int work);
   bool related_to(std::size_t a, std::size_t b, int& work);
+  bool is_regular(std::size_t pattern);
   static double agreeing_share(const Evidence& seen);
   static bool scattered(const Evidence& seen);
   static bool lacks_detail(const Evidence& seen);
@@ -102,9 +104,9 @@ class PrintVerifier {
   std::span<const TrackedPattern> patterns_;
   std::size_t prints_;  ///< the first of them; the others are further copies
   bool known_camera_;
-  std::vector<Evidence> evidence_;       ///< by pattern
-  std::vector<std::uint8_t> regular_;    ///< by pattern: whether it is regular()
-  std::vector<std::uint8_t> relations_;  ///< by two prints: 0 not known yet, 1 none, 2 related
+  std::vector<Evidence> evidence_;            ///< by pattern
+  std::vector<std::optional<bool>> regular_;  ///< by pattern: whether it is regular()
+  std::vector<std::uint8_t> relations_;       ///< by two prints: 0 not known yet, 1 none, 2 related
   /// By pattern: an upright mirror and one that is not, as place_mirrors() left them.
   std::vector<std::array<Mirror, 2>> mirrors_;
 };

@@ -32,6 +32,10 @@ class SearchScheduler {
   /// Searches the frame, or starts to. True where there are candidates at once. known: copies that
   /// are tracked, of prints of several copies.
   bool start(const GrayImage& frame, FeatureExtractor& extractor, std::span<const KnownCopy> known);
+  /// After a find: among many patterns, the next frame is searched again for more.
+  void found() {
+    if (patterns_.size() >= kMany) frames_to_search_ = 0;
+  }
   /// Forgets the search under way.
   void reset();
 

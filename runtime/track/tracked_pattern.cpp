@@ -7,7 +7,6 @@
 
 #include "formats/tracker_record.hpp"
 #include "modar/tracker_features.hpp"
-#include "photometry.hpp"
 
 namespace modar::tracker {
 namespace {
@@ -82,7 +81,6 @@ glm::dvec3 TrackedPattern::on_surface(glm::dvec2 pixel) const {
   out.codes = view.codes.data();
   view_levels(view, out);
   view_patches(view, out);
-  out.fine_cells = fine_cells(out);
   if (shape.empty()) return out;
   if (const char* cause =
           view_pattern_shape(shape, view.header.width, view.header.height, out.surface)) {

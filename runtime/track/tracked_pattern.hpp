@@ -18,6 +18,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include <glm/mat2x2.hpp>
@@ -32,6 +33,10 @@
 
 namespace modar::tracker {
 
+/// Patterns from which on only places that the index names are matched, one find a search. Lower
+/// bounds the time of smaller bundles, too.
+inline constexpr std::size_t kMany = 8;
+
 struct TrackedPattern {
   std::uint32_t index = 0;  ///< of the bundle's patterns
   /// Copies of the print are tracked by a TrackedPattern each, over the same bytes: which of them
@@ -45,7 +50,8 @@ struct TrackedPattern {
   std::array<std::span<const TrackerPatchRecord>, kMaxTrackerImageLevels> patches;  ///< by level
   std::array<GrayImage, kMaxTrackerImageLevels> levels;
   int level_count = 0;
-  std::uint64_t fine_cells = 0;  ///< those whose samples alias, see photometry.hpp
+  /// Those whose samples alias, see photometry.hpp; of many patterns measured at the first use.
+  mutable std::optional<std::uint64_t> fine_cells;
   PatternSurface surface;
   /// Of a flat pattern: its plane relative to its picture, by the middle (the axes of
   /// to_world()). Not of the record: while the camera is a guess, what a pose leaves of a measured

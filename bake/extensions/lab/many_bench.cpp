@@ -20,6 +20,7 @@ constexpr std::size_t kOfPicture = 8;  // four quarters, and those mirrored
 constexpr int kShown = 15;             // frames before a pattern is hidden
 constexpr int kHidden = 10;            // frames for which it is
 constexpr int kPatience = 60;          // frames to wait for it
+constexpr int kWithin = 10;            // frames within which a pattern that comes is found
 
 /// Quarter 0 to 3 of a picture, mirrored from 4 on.
 GrayPicture quarter_of(const GrayPicture& picture, std::size_t which) {
@@ -201,6 +202,64 @@ Result<void> measure_tilts(const PatternSet& many, const Frames& frames, const C
   return {};
 }
 
+/// Whether a tracker that has seen nothing finds a pattern at that pose within kWithin frames.
+Result<bool> finds(PoseLoop& loop, std::uint32_t pattern, const SceneFrame& still, Random random) {
+  loop.reset();
+  TrackResult seen;
+  for (int k = 0; k < kWithin; ++k) {
+    GrayPicture exposed;
+    expose(still.picture, {}, random, exposed);
+    MODAR_TRY(loop.step(exposed.view(), seen));
+    for (const Detection& each : seen.visible) {
+      if (each.pattern == pattern && is_right(each, {true, still.corners})) return true;
+    }
+  }
+  return false;
+}
+
+/// Patterns found within kWithin frames, in the greatest bundle and alone; and names given to
+/// photos that show none of them.
+Result<void> measure_coming(const PatternSet& many, std::span<const std::byte> bytes,
+                            const std::vector<GrayPicture>& backgrounds,
+                            const PoseBenchOptions& options, const ProgressCallback& progress,
+                            std::vector<ManyBenchRow>& rows) {
+  const Camera camera = default_camera(options.width, options.height);
+  MODAR_ASSIGN(const auto loop, PoseLoop::create(BundleView::open(bytes).value(), camera));
+  SceneBand band = easy_band();
+  band.area_low = 0.25;
+  band.tilt_high = 45;
+  Random random(options.seed);
+  double found = 0;
+  double alone = 0;
+  double named = 0;
+  for (int i = 0; i < options.frames; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const GrayPicture photo = another_view(backgrounds[k % backgrounds.size()], random);
+    const auto shown = static_cast<std::uint32_t>(random.next() % many.size());
+    const GrayImage picture = many.pictures[shown].view();
+    const Pose pose = draw_pose(band, picture, camera, random);
+    const SceneFrame still = render_still(picture, camera, pose, photo, band, random, 0.5, {});
+    MODAR_ASSIGN(const auto single, bundle_of_record(picture, many.records[shown]));
+    MODAR_ASSIGN(const auto one, PoseLoop::create(BundleView::open(single).value(), camera));
+    MODAR_ASSIGN(const bool here, finds(*loop, shown, still, random));
+    MODAR_ASSIGN(const bool there, finds(*one, 0, still, random));
+    found += here ? 1 : 0;
+    alone += there ? 1 : 0;
+    loop->reset();
+    TrackResult seen;
+    GrayPicture exposed;
+    expose(photo, {}, random, exposed);
+    MODAR_TRY(loop->step(exposed.view(), seen));
+    named += seen.visible.empty() ? 0 : 1;
+    if (progress) progress("coming", (i + 1.0) / options.frames);
+  }
+  const int patterns = static_cast<int>(many.size());
+  const double percent = 100.0 / options.frames;
+  rows.push_back({"coming within_10_pct", patterns, percent * found, percent * alone});
+  rows.push_back({"coming photos_named", patterns, named, 0});
+  return {};
+}
+
 /// From mapped bytes to a tracker that takes frames: median time and heap; then the time of its
 /// first search and the heap after it.
 Result<void> measure_ready(std::span<const std::byte> bytes, int patterns, const Camera& camera,
@@ -348,6 +407,9 @@ Result<std::vector<ManyBenchRow>> bench_many(const PoseBenchOptions& options,
   };
   if (wanted("detection")) MODAR_TRY(measure_detection(many, frames, camera, progress, rows));
   if (wanted("tilt")) MODAR_TRY(measure_tilts(many, frames, camera, progress, rows));
+  if (wanted("coming")) {
+    MODAR_TRY(measure_coming(many, bytes, backgrounds, options, progress, rows));
+  }
   if (wanted("ready")) {
     MODAR_TRY(measure_ready(bytes, options.many, camera, frames.at(0, 0), rows));
   }

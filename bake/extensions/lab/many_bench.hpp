@@ -21,7 +21,7 @@ struct ManyBenchRow {
 /// Detection, set-up and return with 1, 10 and options.many patterns: the options' pictures, or
 /// where they are fewer, their quarters, and those mirrored. Single-threaded; options.frames:
 /// frames of each count, which show the patterns in turn, and how often a pattern is hidden. only:
-/// text in the names of the parts that run (detection, tilt, ready, return). Measures as in
+/// text in the names of the parts that run (detection, tilt, coming, ready, return). Measures as in
 /// bake/commands/json.md. Errors: kUsage "bench.input" for too few pictures or no background; those
 /// of baking and of the tracker.
 Result<std::vector<ManyBenchRow>> bench_many(const PoseBenchOptions& options,
