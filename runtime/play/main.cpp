@@ -177,9 +177,8 @@ int start(int argc, char** argv) {
   }
   const NewFolders folders(*options);
   const Result<int> done = run(*options);
-  if (done) return *done;
-  folders.remove_empty();
-  return report(done.error());
+  if (!done || *done != 0) folders.remove_empty();
+  return done ? *done : report(done.error());
 }
 
 }  // namespace

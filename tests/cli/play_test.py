@@ -359,6 +359,9 @@ class Play(ProgramTest):
         self.assertEqual(list(out.iterdir()), [])
         self.assert_fails(self.play(bundle, "--turntable", "2", "--out", "x.txt"), 1, "FILE.mp4, or a folder", "x.txt/")
         self.assertFalse((self.folder / "x.txt").exists())
+        (self.folder / "cut.nv21").write_bytes(bytes(99))
+        self.assert_fails(self.play(bundle, "--input", "nv21:64x48:cut.nv21", "--out", "cut"), 3, "ends after 99 of 4608 bytes")
+        self.assertFalse((self.folder / "cut").exists())
 
     def test_a_film_alone_turns_with_its_poster(self):
         done = self.play(bake_film(self), "--turntable", "3", "--out", "turn", "--size", "96x64", "--json")
