@@ -16,7 +16,6 @@
 #include "formats/check.hpp"
 #include "formats/meta_text.hpp"
 #include "formats/tracker_record.hpp"
-#include "modar/pose_loop.hpp"
 #include "modar/renderer.hpp"
 #include "runtime/capi/handles.hpp"
 
@@ -158,10 +157,6 @@ int modar_model_bounds(const modar_bundle* bundle, uint32_t index, float low[3],
 double modar_pattern_width_mm(const modar_bundle* bundle, uint32_t index) {
   if (index >= modar_pattern_count(bundle)) return 0.0;
   return static_cast<double>(bundle->view.patterns()[index].width_mm);
-}
-
-uint32_t modar_pattern_copies(const modar_bundle* bundle, uint32_t index) {
-  return bundle == nullptr ? 1 : modar::copies_of(bundle->view, index, 0);
 }
 
 int modar_camera_read(const char* path, modar_camera* camera, modar_error* error) {

@@ -62,6 +62,10 @@ void set_pose(const modar::Pose& from, const glm::dmat4x3& stretch, modar_pose& 
 
 }  // namespace
 
+uint32_t modar_pattern_copies(const modar_bundle* bundle, uint32_t index) {
+  return bundle == nullptr ? 1 : modar::copies_of(bundle->view, index, 0);
+}
+
 modar_tracker* modar_tracker_create(const modar_bundle* bundle, const modar_camera* camera,
                                     const modar_tracker_options* options, modar_error* error) {
   if (bundle == nullptr || camera == nullptr) {

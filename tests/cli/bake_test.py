@@ -190,7 +190,7 @@ class Bake(ProgramTest):
         model.write_text("\n".join(lines + [turned] + faces[1:] + [faces[9]]) + "\n")
         out = self.folder / "worn.modar"
         plain = self.modar("bake", "--model", model, "--no-lods", "--no-occlusion", "-o", out)
-        self.assertIn("1 repeated triangles", plain.stderr)
+        self.assertIn("1 repeated triangle, ", plain.stderr)
         self.assertIn("--repair", plain.stderr)
         report = self.modar_json("bake", "--model", model, "--no-lods", "--no-occlusion", "--repair", "-o", out)
         done = report["bundle"]["models"][0]["repair"]

@@ -239,7 +239,7 @@ class Pattern(ProgramTest):
             *(f"detection {what} x{count}" for what in ("cpu_ms", "right_pct", "others") for count in (1, 2)),
             *(f"detection tilt {tilt} {what} x2" for what in ("right_pct", "others")
               for tilt in ("45-60", "60-70", "70-75", "75-80")),
-            "ready_ms x2", "ready_heap_bytes x2", "first_search cpu_ms x2", "searching_heap_bytes x2",
+            "coming within_10_pct x2", "coming photos_named x2", "ready_ms x2", "ready_heap_bytes x2", "first_search cpu_ms x2", "searching_heap_bytes x2",
             *(f"return_{how} {what} x2" for how in ("alone", "beside")
               for what in ("mean_frames", "worst_frames", "times"))})
         for count in (1, 2):

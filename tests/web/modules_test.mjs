@@ -151,7 +151,7 @@ test('a bundle arrives in the engine in parts', () => {
     arrive: 1000, reserve: 2000, piece: (index) => 300 * index, pattern_count: 2, pattern_name: (i) => names[i], pattern_width_mm: (i) => 10 * i,
     language: (i) => (i < 1 ? 22 : 0), node_count: 2, node: (i, field) => rows.node[i][field], node_text: (i, kind) => 30 + 10 * i + kind,
     scene_count: 2, scene: (i, field) => rows.scene[i][field], model_name: (model) => 20 + model, media: 300, media_size: 2, stand: (scene) => (scene < 2 ? 1 : 0),
-    poses: 512 });
+    poses: 512, copies: 3 });
   Object.assign(texts, { 20: 'cover', 21: 'map', 22: 'en', 25: 'pot', 26: 'lid', 30: 'text', 31: 'alt', 32: 'title', 33: 'rim', 34: '1', 43: 'film' });
   engine.arrive(16, [{ offset: 2, bytes: Uint8Array.of(1, 2) }, { offset: 8, bytes: Uint8Array.of(3) }]);
   assert.deepEqual([...engine.bytes], [0, 0, 1, 2, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0]);
@@ -176,7 +176,7 @@ test('a bundle arrives in the engine in parts', () => {
   assert.deepEqual(engine.patterns.map(({ name }) => name), ['cover', 'map', 'own', 'stands']);
   engine.forgetPatterns(2);
   assert.equal(engine.patterns.length, 2);
-  assert.equal(engine.step(64, 0.5).length, 2 * 45);
+  assert.equal(engine.step(64, 0.5).length, 3 * 2 * 45);
   engine.look({ data: Uint8Array.of(1, 2, 3, 4), width: 1, height: 1 });
   assert.deepEqual([...heap.subarray(2000, 2004)], [1, 2, 3, 4]);
   const done = new Set(['pass', 'recipe', 'begin_piece', 'piece', 'add_pattern', 'step', 'look']);
