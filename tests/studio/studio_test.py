@@ -261,7 +261,7 @@ class Page(StudioTest):
         hand.wait("document.querySelector('canvas[data-shown]')", "the preview")
         self.look("03-picture")
         self.drag_a_corner()
-        hand.settle()  # the verdict of the new corners moves the papers
+        hand.settle()
         hand.click("input[value=a4]")
         hand.wait("document.querySelector('input[value=a4]').checked", "A4")
         self.look("06-sized")

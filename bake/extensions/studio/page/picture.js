@@ -171,15 +171,24 @@ function reach({range_cm: known, range_widths: widths}, width) {
       '';
 }
 
+/**
+ * The last verdict of each pattern: it stays while the next one is made, so that nothing moves
+ * under a finger.
+ * @type {Map<string, Studio.Score>}
+ */
+const verdicts = new Map();
+
 /** @param {Studio.Pattern} pattern */
 function verdict(pattern) {
   const score = state.scores.get(pattern.name);
   if (!score) loadScore(pattern.name);
-  if (!score || score.pending) return m('p.small', {'aria-busy': 'true'}, t('judging'));
-  if (score.failed) return null;
+  if (score?.failed) return null;
+  if (score && !score.pending) verdicts.set(pattern.name, score);
+  const known = verdicts.get(pattern.name);
   return m(
-      'div.verdict', m('p', grade(score.grade), m('b', t(`grade.${score.grade}`))),
-      m('p.small', reach(score, widthOf(pattern))));
+      'div.verdict', known && m('p', grade(known.grade), m('b', t(`grade.${known.grade}`))),
+      known && known === score ? m('p.small', reach(known, widthOf(pattern))) :
+                                 m('p.small', {'aria-busy': 'true'}, t('judging')));
 }
 
 /** @param {Studio.Pattern} pattern */
