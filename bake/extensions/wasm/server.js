@@ -24,7 +24,8 @@ const MOST_POST_BYTES = 4 * 2 ** 20;
 const MOST_UPLOAD_BYTES = 2 ** 31;
 const MOST_LISTENERS = 8;
 const SILENT_MS = 10_000;
-const REFUSED_MS = 1_000;  // for which the rest of a refused body is read
+const PAUSE_MS = 1_000;  // after which no more of a refused body is waited for
+const MOST_REST_BYTES = 64 * 2 ** 20;  // of a refused body, which are read
 const BEAT_MS = 5_000;  // so often a page hears that the studio is there
 const SECRET_BYTES = 20;
 const VALID_DAYS = 7;
@@ -148,7 +149,7 @@ function serveSite({ folder, bind, port: number }) {
   const server = https.createServer(makeCertificate(addresses), (request, response) => {
     for (const [name, value] of Object.entries(SITE_HEADERS)) response.setHeader(name, value);
     const name = addressOf(request)?.name ?? '';
-    const file = ['GET', 'HEAD'].includes(request.method) && fileInside(toSystem(folder), name.endsWith('/') ? `${name}index.html` : name);
+    const file = ['GET', 'HEAD'].includes(request.method) && !name.includes('//') && fileInside(toSystem(folder), name.endsWith('/') ? `${name}index.html` : name);
     if (file) sendFile(request, response, file);
     else response.writeHead(404).end();
   });
@@ -269,16 +270,31 @@ class Studio {
     return request.on('end', () => this.ask(request, response, { ...call, body: Buffer.concat(parts).toString() }));
   }
 
+  /** Answers when the body has ended, pauses or has no end: who still sends would see the connection end in place of the answer. */
+  tooLarge(request, response) {
+    let rest = MOST_REST_BYTES;
+    const answer = () => {
+      clearTimeout(pause);
+      if (response.writableEnded) return;
+      this.wrong(response, 413, { error: 'it is too large', cure: "make it smaller, or copy it into the project's folder yourself", code: 'studio.too-large' });
+    };
+    const pause = setTimeout(answer, PAUSE_MS);
+    response.refused = true;
+    response.setHeader('Connection', 'close');
+    request.unpipe().removeAllListeners('data').removeAllListeners('end').on('end', answer).on('data', (part) => {
+      rest -= part.length;
+      if (rest < 0) answer();
+      else pause.refresh();
+    }).resume();
+  }
+
   /** Refuses a body of more bytes, as soon as it says so or comes. */
   bound(request, response, most, refused) {
     let bytes = Number(request.headers['content-length'] ?? 0);
     const look = () => {
-      if (bytes <= most || response.writableEnded) return bytes > most;
+      if (bytes <= most) return false;
+      this.tooLarge(request, response);
       refused();
-      request.unpipe().removeAllListeners('data').removeAllListeners('end').resume();
-      // Who still sends reads the answer after that, and would see the end of the connection alone.
-      response.on('finish', () => setTimeout(() => request.destroy(), REFUSED_MS)).setHeader('Connection', 'close');
-      this.wrong(response, 413, { error: 'it is too large', cure: "make it smaller, or copy it into the project's folder yourself", code: 'studio.too-large' });
       return true;
     };
     if (look()) return true;
@@ -297,7 +313,7 @@ class Studio {
     request.on('close', () => request.complete || writing.destroy(new Error('the page went away')));
     writing.on('error', ({ message }) => {
       remove();
-      if (!response.writableEnded) this.wrong(response, 500, { error: `the file cannot be saved: ${message}`, cure: 'check the disk', code: 'io.write' });
+      if (!response.refused && !response.writableEnded) this.wrong(response, 500, { error: `the file cannot be saved: ${message}`, cure: 'check the disk', code: 'io.write' });
     });
     writing.on('close', () => writing.errored || this.ask(request, response, { ...call, upload: file.replaceAll('\\', '/') }, remove));
     if (!this.bound(request, response, MOST_UPLOAD_BYTES, () => writing.destroy(new Error('it is too large')))) request.pipe(writing);
