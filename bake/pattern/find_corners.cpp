@@ -940,10 +940,10 @@ bool holds_another(const cv::Mat& rgb, const Gradients& gradients,
 /// Whether edges are at equal distances to both sides of a figure, and above and below it, as
 /// those of a border are around the picture in it.
 bool bordered(const Gradients& gradients, const std::array<Point, 4>& corners) {
-  constexpr std::size_t kSteps = 160;  // a pixel each
-  constexpr double kEqualRatio = 1.5;  // most ratio of two distances that are equal
-  constexpr double kSameRatio = 1.1;   // the same where one of the edges is weak
-  constexpr double kWeakSupport = 0.3;
+  constexpr std::size_t kSteps = 160;   // a pixel each
+  constexpr double kEqualRatio = 1.5;   // most ratio of two distances that are equal
+  constexpr double kSameRatio = 1.1;    // the same where one of the edges is weak
+  constexpr double kWeakSupport = 0.3;  // share of a side that shows such an edge, at least
   const cv::Matx33d plane = plane_of(corners);
   const auto distance = [](std::size_t k) {
     return kNearBorder + (kFarBorder - kNearBorder) * static_cast<double>(k) / kSteps;

@@ -154,7 +154,7 @@ class PatternSearch {
   bool ready_ = false;  ///< the index, if there is one
   std::vector<std::uint32_t> selected_;
   std::vector<std::uint8_t> has_votes_;  ///< by pattern
-  std::vector<std::uint8_t> failures_;   ///< by pattern: its places that showed it not, of late
+  std::vector<std::uint8_t> failures_;   ///< by pattern: its recent places that failed
   std::vector<TrackerFeature> near_;     ///< in the place that the index gave the pattern
   std::size_t likely_ = 0;               ///< the first of selected_, which are always matched
   std::uint32_t turn_ = 0;               ///< the pattern whose turn is next

@@ -40,13 +40,13 @@ class Counter {
     const std::vector<bool> islands = components.islands(many);
     PointBox whole;
     PointBox rest;
+    const auto join = [](PointBox& to, const PointBox& box) {
+      to.add(box.low);
+      to.add(box.high);
+    };
     for (std::size_t p = 0; p < islands.size(); ++p) {
-      const PointBox& box = components.at(p).box;
-      for (PointBox* each : {&whole, islands[p] ? nullptr : &rest}) {
-        if (each == nullptr) continue;
-        each->add(box.low);
-        each->add(box.high);
-      }
+      join(whole, components.at(p).box);
+      if (!islands[p]) join(rest, components.at(p).box);
       if (islands[p]) ++defects_.of(Defect::kIsland).count;
     }
     if (rest.diagonal() > 0) spread_ = whole.diagonal() / rest.diagonal();
