@@ -227,10 +227,13 @@ TEST(PoseLoopCopiesMoving, TheCApiTellsThePoseOfEachCopy) {
     }
     EXPECT_EQ(shown, std::min(most, 3));
     EXPECT_EQ(modar_tracker_copy(tracker, 1, 0, nullptr), 0);
+    EXPECT_EQ(modar_pattern_copies(bundle, 0), static_cast<std::uint32_t>(std::max(1, stated)));
+    EXPECT_EQ(modar_pattern_copies(bundle, 1), 1u);
     modar_tracker_destroy(tracker);
     modar_bundle_close(bundle);
   }
   EXPECT_EQ(modar_tracker_copy(nullptr, 0, 0, nullptr), 0);
+  EXPECT_EQ(modar_pattern_copies(nullptr, 0), 1u);
   EXPECT_EQ(modar_tracker_crowded(nullptr), -1);
 }
 
