@@ -51,10 +51,7 @@ struct Array {
 };
 
 std::array<Array, 4> arrays_of(const TrackerRecordHeader& header) {
-  std::uint64_t pixels = 0;
-  for (std::uint32_t level = 0; level < header.level_count; ++level) {
-    pixels += std::uint64_t{header.width >> level} * (header.height >> level);
-  }
+  const std::uint64_t pixels = std::uint64_t{header.width} * header.height;
   return {{{offsetof(TrackerRecordHeader, features_offset), header.features_offset,
             header.feature_count * sizeof(TrackerFeatureRecord), alignof(TrackerFeatureRecord)},
            {offsetof(TrackerRecordHeader, codes_offset), header.codes_offset,

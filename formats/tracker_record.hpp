@@ -27,13 +27,13 @@ struct TrackerRecordHeader {
   std::uint32_t patch_count;
   std::uint32_t width;  ///< of the pattern's image, 1 to 1023
   std::uint32_t height;
-  std::uint32_t level_count;  ///< of the image: each level halves the one before, rounding down
+  std::uint32_t level_count;  ///< of patches: each halves the image of the one before, rounding down
   std::uint32_t reserved0;
   std::uint64_t features_offset;  ///< TrackerFeatureRecord[feature_count]
   std::uint64_t codes_offset;  ///< a multiple of 64; blocks of kTrackerBlockCodes codes: byte 0 of
                                ///< all codes of the block, then byte 1, ...
   std::uint64_t patches_offset;  ///< TrackerPatchRecord[patch_count], by level
-  std::uint64_t pixels_offset;   ///< 8-bit gray levels, finest first, rows without padding
+  std::uint64_t pixels_offset;   ///< of the image, 8-bit gray, rows without padding
   std::uint64_t reserved1[8];
 };
 static_assert(sizeof(TrackerRecordHeader) == 128);
@@ -63,7 +63,7 @@ struct TrackerRecordView {
   std::span<const TrackerFeatureRecord> features;
   std::span<const std::uint8_t> codes;
   std::span<const TrackerPatchRecord> patches;
-  std::span<const std::uint8_t> pixels;  ///< all levels, the finest first
+  std::span<const std::uint8_t> pixels;  ///< of the image, width * height
 };
 
 struct TrackerFault {

@@ -253,8 +253,7 @@ def read_loop_record(data, pattern):
          max(width, height) <= 1023 and
          (width, height) == (pattern["width"], pattern["height"]) and min(width, height) >> (levels - 1) >= 1 and
          codes % 64 == features % 2 == patches % 2 == 0, "LOOP_RECORD", 0, "header")
-    image = sum((width >> level) * (height >> level) for level in range(levels))
-    for at, size in ((features, 12 * count), (codes, 32 * count), (patches, 8 * patch_count), (pixels, image)):
+    for at, size in ((features, 12 * count), (codes, 32 * count), (patches, 8 * patch_count), (pixels, width * height)):
         need(128 <= at and at + size <= len(data), "LOOP_RECORD", 0, "an array leaves the section")
     places = [*struct.iter_unpack("<2H8x", data[features:features + 12 * count]),
               *struct.iter_unpack("<2H4x", data[patches:patches + 8 * patch_count])]

@@ -144,10 +144,8 @@ std::vector<std::byte> assemble_record(const std::vector<GrayPicture>& levels,
   for (std::size_t i = 0; i < patches.size(); ++i) {
     put(bytes, header.patches_offset + i * sizeof(TrackerPatchRecord), patches[i]);
   }
-  for (const GrayPicture& level : levels) {
-    const auto pixels = std::as_bytes(std::span(level.pixels));
-    bytes.insert(bytes.end(), pixels.begin(), pixels.end());
-  }
+  const auto pixels = std::as_bytes(std::span(levels[0].pixels));
+  bytes.insert(bytes.end(), pixels.begin(), pixels.end());
   return bytes;
 }
 

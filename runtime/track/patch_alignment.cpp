@@ -120,7 +120,7 @@ void PatchCache::motion_blur(const TrackedPattern& pattern, int level, const Pat
                              glm::dvec2 motion, Patch& blurred) {
   constexpr int kMaxSamples =
       16;  // of the exposure, one a pixel: longer motions are sampled coarser
-  const GrayImage& image = pattern.levels[static_cast<std::size_t>(level)];
+  const GrayImage& image = pattern.pyramid()[static_cast<std::size_t>(level)];
   const double grow = static_cast<double>(1 << level);
   const glm::dvec2 centre = patch.centre;
   const auto x0 = static_cast<float>((centre.x + 0.5) / grow - 0.5) - kPatchHalf - kRing;
@@ -158,12 +158,11 @@ std::span<Patch> PatchCache::of(const TrackedPattern& pattern, int level) {
   oldest->level = level;
   oldest->last_use = uses_;
   oldest->patches.clear();
+  const GrayImage& image = pattern.pyramid()[static_cast<std::size_t>(level)];
   Patch patch;
   for (const TrackerPatchRecord& record : pattern.patches[static_cast<std::size_t>(level)]) {
     if (oldest->patches.size() == kMaxPatches) break;
-    if (cut(pattern.levels[static_cast<std::size_t>(level)], record, level, patch)) {
-      oldest->patches.push_back(patch);
-    }
+    if (cut(image, record, level, patch)) oldest->patches.push_back(patch);
   }
   return oldest->patches;
 }

@@ -150,8 +150,7 @@ bool CellGrid::see(int cell, CellSamples& seen, const Mirror* mirror, double spr
 
 void CellGrid::expect(const TrackedPattern& print, int cell, CellSamples& expected,
                       const Mirror* mirror, double spread, int side) {
-  const Filtered picture(std::span(print.levels).first(static_cast<std::size_t>(print.level_count)),
-                         spread * step_of(print, side));
+  const Filtered picture(print.pyramid(), spread * step_of(print, side));
   for (int k = 0; k < kCellSamples * kCellSamples; ++k) {
     const glm::dvec2 share = place_of(print, cell, k, mirror, side);
     expected[static_cast<std::size_t>(k)] =

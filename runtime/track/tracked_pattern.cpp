@@ -7,22 +7,28 @@
 
 #include "formats/tracker_record.hpp"
 #include "modar/tracker_features.hpp"
+#include "kernels.hpp"
 
 namespace modar::tracker {
 namespace {
 
 static_assert(kFeatureExtractorVersion == kTrackerExtractorVersion);
 
-void view_levels(const TrackerRecordView& view, TrackedPattern& out) {
-  const std::uint8_t* pixels = view.pixels.data();
-  for (std::uint32_t level = 0; level < view.header.level_count; ++level) {
-    const std::uint32_t width = view.header.width >> level;
-    const std::uint32_t height = view.header.height >> level;
-    out.levels[level] = {pixels, static_cast<int>(width), static_cast<int>(height),
-                         static_cast<std::ptrdiff_t>(width)};
-    pixels += std::size_t{width} * height;
+void halve(const GrayImage& image, int level_count, PatternPyramid& out) {
+  const auto area = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+  out.pixels.resize(area / 3 + 1);
+  out.levels[0] = image;
+  std::uint8_t* next = out.pixels.data();
+  for (int level = 1; level < level_count; ++level) {
+    const GrayImage& from = out.levels[static_cast<std::size_t>(level) - 1];
+    const int width = from.width / 2;
+    const int height = from.height / 2;
+    out.levels[static_cast<std::size_t>(level)] = {next, width, height, width};
+    for (int y = 0; y < height; ++y, next += width) {
+      const std::uint8_t* top = from.pixels + 2 * y * from.stride;
+      kernels().halve_row(top, top + from.stride, next, width);
+    }
   }
-  out.level_count = static_cast<int>(view.header.level_count);
 }
 
 void view_patches(const TrackerRecordView& view, TrackedPattern& out) {
@@ -53,6 +59,11 @@ glm::dmat3 TrackedPattern::world_from_pixels() const {
   return m;
 }
 
+std::span<const GrayImage> TrackedPattern::pyramid() const {
+  std::call_once(coarser->made, [this] { halve(image, level_count, *coarser); });
+  return std::span(coarser->levels).first(static_cast<std::size_t>(level_count));
+}
+
 glm::dvec3 TrackedPattern::on_surface(glm::dvec2 pixel) const {
   if (surface.flat()) return {to_world(pixel), 0.0};
   const auto at = surface.at(pixel.x, pixel.y).at;
@@ -79,7 +90,11 @@ glm::dvec3 TrackedPattern::on_surface(glm::dvec2 pixel) const {
   out.bright_count = view.header.bright_count;
   out.features = view.features;
   out.codes = view.codes.data();
-  view_levels(view, out);
+  out.image = {view.pixels.data(), static_cast<int>(view.header.width),
+               static_cast<int>(view.header.height),
+               static_cast<std::ptrdiff_t>(view.header.width)};
+  out.level_count = static_cast<int>(view.header.level_count);
+  out.coarser = std::make_shared<PatternPyramid>();
   view_patches(view, out);
   if (shape.empty()) return out;
   if (const char* cause =

@@ -2,7 +2,7 @@
 //
 // What runtime/track offers inside, each header building on those before it:
 //   kernels.hpp           loops over pixels and bits, one table per SIMD level
-//   tracked_pattern.hpp   a pattern's record: features, codes, patches, image levels
+//   tracked_pattern.hpp   a pattern's record: features, codes, patches, image
 //   plane_geometry.hpp    maps between pattern and frame, poses from points, motion model
 //   patch_alignment.hpp   Gauss-Newton over small patches
 //   pose_refinement.hpp   coarse to fine, from features to a pose, photometric check
@@ -18,8 +18,11 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include <glm/mat2x2.hpp>
 #include <glm/mat3x3.hpp>
@@ -37,6 +40,13 @@ namespace modar::tracker {
 /// bounds the time of smaller bundles, too.
 inline constexpr std::size_t kMany = 8;
 
+/// Halvings of a pattern's image, which the record does not hold.
+struct PatternPyramid {
+  std::once_flag made;
+  std::array<GrayImage, kMaxTrackerImageLevels> levels;
+  std::vector<std::uint8_t> pixels;  ///< of all but the first
+};
+
 struct TrackedPattern {
   std::uint32_t index = 0;  ///< of the bundle's patterns
   /// Copies of the print are tracked by a TrackedPattern each, over the same bytes: which of them
@@ -48,8 +58,9 @@ struct TrackedPattern {
   std::span<const TrackerFeatureRecord> features;
   const std::uint8_t* codes = nullptr;
   std::array<std::span<const TrackerPatchRecord>, kMaxTrackerImageLevels> patches;  ///< by level
-  std::array<GrayImage, kMaxTrackerImageLevels> levels;
-  int level_count = 0;
+  GrayImage image;      ///< the record's
+  int level_count = 0;  ///< of pyramid()
+  std::shared_ptr<PatternPyramid> coarser;  ///< of the image; copies share it
   /// Those whose samples alias, see photometry.hpp; of many patterns measured at the first use.
   mutable std::optional<std::uint64_t> fine_cells;
   PatternSurface surface;
@@ -58,12 +69,14 @@ struct TrackedPattern {
   /// homography.
   glm::dmat2 shape{1.0};
 
-  [[nodiscard]] int width() const { return levels[0].width; }
+  [[nodiscard]] int width() const { return image.width; }
+  /// The image and its halvings, finest first; made at the first call, which any thread may make.
+  [[nodiscard]] std::span<const GrayImage> pyramid() const;
   /// Whether a detection is of this copy.
   [[nodiscard]] bool shown_by(std::uint32_t pattern, std::uint32_t its_copy) const {
     return pattern == index && its_copy == copy;
   }
-  [[nodiscard]] int height() const { return levels[0].height; }
+  [[nodiscard]] int height() const { return image.height; }
   /// Image pixels (centres at integers) to the pattern plane (ModAR Eq. 1), and back.
   [[nodiscard]] glm::dvec2 to_world(glm::dvec2 pixel) const;
   [[nodiscard]] glm::dmat3 world_from_pixels() const;

@@ -154,7 +154,7 @@ constexpr CorruptCase kPayloadCases[] = {
          ExtraSection section;
          section.type = static_cast<std::uint32_t>(SectionType::kTrackerRecord);
          section.owner = 0;
-         section.bytes.resize(header.pixels_offset + 64 * 48 + 32 * 24);
+         section.bytes.resize(header.pixels_offset + 64 * 48);
          std::memcpy(section.bytes.data(), &header, sizeof header);
          std::memcpy(section.bytes.data() + sizeof header, patches, sizeof patches);
          c.extra.push_back(section);

@@ -84,8 +84,8 @@ TEST(TrackerReason, FollowsFromTheEvidence) {
 
 TEST(TrackerReason, FeaturesOfASmallPrintAgreeOverManyFrames) {
   tracker::TrackedPattern pattern;
-  pattern.levels[0].width = 400;
-  pattern.levels[0].height = 300;
+  pattern.image.width = 400;
+  pattern.image.height = 300;
   // A tenth of its size, 30 x 40 pixels from (200, 100) on; one feature a frame, of six.
   const auto vote = [](int which, glm::dvec2 corner) {
     tracker::FeatureMatch match;

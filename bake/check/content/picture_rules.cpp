@@ -118,8 +118,7 @@ void check_pictures(ContentLog& log) {
     // Packing finds each feature in the picture again, and fails where one is not there.
     if (record.empty() || pack_tracker_record(record)) continue;
     log.tell(WorkstationRule::kPatternContent, where, record.data(),
-             "its picture does not give the features, codes, patches and coarser levels that are "
-             "stored");
+             "its picture does not give the features, codes and patches that are stored");
   }
 }
 
