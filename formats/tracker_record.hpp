@@ -27,7 +27,7 @@ struct TrackerRecordHeader {
   std::uint32_t patch_count;
   std::uint32_t width;  ///< of the pattern's image, 1 to 1023
   std::uint32_t height;
-  std::uint32_t level_count;  ///< of patches: each halves the image of the one before, rounding down
+  std::uint32_t level_count;  ///< of patches: each halves the one before, rounding down
   std::uint32_t reserved0;
   std::uint64_t features_offset;  ///< TrackerFeatureRecord[feature_count]
   std::uint64_t codes_offset;  ///< a multiple of 64; blocks of kTrackerBlockCodes codes: byte 0 of

@@ -108,16 +108,14 @@ PoseLoop::~PoseLoop() = default;
   }
   auto state = std::make_unique<State>(camera, options);
   const std::uint32_t count = bundle.patterns().size();
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const auto bytes = bundle.section(SectionType::kTrackerRecord, i);
-    if (bytes.empty()) continue;
-    MODAR_ASSIGN(
-        const TrackedPattern pattern,
-        tracker::view_tracked_pattern(bytes, i, bundle.section(SectionType::kPatternShape, i)));
-    state->patterns.push_back(pattern);
-  }
-  for (std::uint32_t i = 0; i < own.size(); ++i) {
-    MODAR_ASSIGN(const TrackedPattern pattern, tracker::view_tracked_pattern(own[i], count + i));
+  const auto all = static_cast<std::uint32_t>(count + own.size());
+  const auto coarser = std::make_shared<std::vector<tracker::PatternPyramid>>(all);
+  for (std::uint32_t i = 0; i < all; ++i) {
+    const auto bytes = i < count ? bundle.section(SectionType::kTrackerRecord, i) : own[i - count];
+    if (bytes.empty() && i < count) continue;
+    const auto shape = i < count ? bundle.section(SectionType::kPatternShape, i) : OwnRecord{};
+    MODAR_ASSIGN(const TrackedPattern pattern,
+                 tracker::view_tracked_pattern(bytes, i, shape, {coarser, &(*coarser)[i]}));
     state->patterns.push_back(pattern);
   }
   if (state->patterns.empty()) {

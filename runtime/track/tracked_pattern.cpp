@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <cstring>
 #include <string>
+#include <utility>
 
 #include "formats/tracker_record.hpp"
-#include "modar/tracker_features.hpp"
 #include "kernels.hpp"
+#include "modar/tracker_features.hpp"
 
 namespace modar::tracker {
 namespace {
@@ -72,7 +73,8 @@ glm::dvec3 TrackedPattern::on_surface(glm::dvec2 pixel) const {
 
 [[gnu::cold]] Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes,
                                                           std::uint32_t index,
-                                                          std::span<const std::byte> shape) {
+                                                          std::span<const std::byte> shape,
+                                                          std::shared_ptr<PatternPyramid> coarser) {
   std::uint32_t version = 0;
   if (bytes.size() >= sizeof version) std::memcpy(&version, bytes.data(), sizeof version);
   if (bytes.size() >= sizeof(TrackerRecordHeader) && version != kFeatureExtractorVersion) {
@@ -94,7 +96,7 @@ glm::dvec3 TrackedPattern::on_surface(glm::dvec2 pixel) const {
                static_cast<int>(view.header.height),
                static_cast<std::ptrdiff_t>(view.header.width)};
   out.level_count = static_cast<int>(view.header.level_count);
-  out.coarser = std::make_shared<PatternPyramid>();
+  out.coarser = coarser != nullptr ? std::move(coarser) : std::make_shared<PatternPyramid>();
   view_patches(view, out);
   if (shape.empty()) return out;
   if (const char* cause =

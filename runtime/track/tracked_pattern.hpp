@@ -58,8 +58,8 @@ struct TrackedPattern {
   std::span<const TrackerFeatureRecord> features;
   const std::uint8_t* codes = nullptr;
   std::array<std::span<const TrackerPatchRecord>, kMaxTrackerImageLevels> patches;  ///< by level
-  GrayImage image;      ///< the record's
-  int level_count = 0;  ///< of pyramid()
+  GrayImage image;                          ///< the record's
+  int level_count = 0;                      ///< of pyramid()
   std::shared_ptr<PatternPyramid> coarser;  ///< of the image; copies share it
   /// Those whose samples alias, see photometry.hpp; of many patterns measured at the first use.
   mutable std::optional<std::uint64_t> fine_cells;
@@ -94,8 +94,10 @@ inline std::size_t count_of_prints(std::span<const TrackedPattern> patterns) {
 /// Views a section's bytes, which must outlive the pattern. Every count and offset is validated,
 /// and every feature and patch is within the image: nothing later checks again. Errors:
 /// kInvalidInput "tracker.record"; kUnsupported "tracker.record-version". shape: of a
-/// SectionType::kPatternShape section; none: flat.
+/// SectionType::kPatternShape section; none: flat. coarser: nothing was put in yet; none: one of
+/// its own.
 Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes, std::uint32_t index,
-                                            std::span<const std::byte> shape = {});
+                                            std::span<const std::byte> shape = {},
+                                            std::shared_ptr<PatternPyramid> coarser = nullptr);
 
 }  // namespace modar::tracker

@@ -225,7 +225,7 @@ TEST_F(Content, PatternsAndShadowsFollowFromWhatIsStored) {
   Bytes copy = good();
   std::memcpy(&header, &at(copy, SectionType::kTrackerRecord, 0), sizeof header);
   for (const std::uint64_t offset : {header.codes_offset + 3, header.features_offset + 8,
-                                     header.patches_offset + 6, header.pixels_offset + 96 * 96}) {
+                                     header.patches_offset + 6, header.pixels_offset + 48 * 96}) {
     expect("PATTERN_CONTENT", [offset](Bytes& bytes) {
       at(bytes, SectionType::kTrackerRecord, static_cast<std::size_t>(offset)) ^= std::byte{8};
     });
