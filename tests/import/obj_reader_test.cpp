@@ -188,6 +188,20 @@ TEST(ObjReader, ColoursOfSomeOrAllVertices) {
   EXPECT_TRUE(parse("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n").colours.empty());
 }
 
+// ZBrush: a mask and a colour of each vertex, hexadecimal, several a comment.
+TEST(ObjReader, ColoursInCommentsOfZBrush) {
+  const SourceModel m =
+      parse(kTriangle + "#MRGB FFFF0000ff00ff33\n# note\n#MRGB 000000FF\nf 1 2 3\n");
+  ASSERT_EQ(m.colours.size(), 3u);
+  EXPECT_EQ(m.colours[0], glm::vec3(1, 0, 0));
+  EXPECT_EQ(m.colours[1], glm::vec3(0, 1, 0.2f));
+  EXPECT_EQ(m.colours[2], glm::vec3(0, 0, 1));
+  EXPECT_TRUE(m.diagnostics.empty());
+  const SourceModel other = parse(kTriangle + "#MRGB FFFF0000FF00FF\nf 1 2 3\n");
+  EXPECT_TRUE(other.colours.empty());
+  EXPECT_EQ(diagnostics(other), (std::multiset<std::string>{"obj.painted:0"}));
+}
+
 TEST(ObjReader, LinesPointsAndCurvesAreSkippedAndTheirLinesNamed) {
   const SourceModel m = parse(kTriangle +
                               "g a b\no thing\np 1 2\nf 1 2 3\nl 1 2 3\nl 2 3\n"

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -430,8 +431,25 @@ class BlockParser {
     } else if (c == 'f' && is_blank(next)) {
       return face();
     }
+    if (c == '#') paint();
     if (at_end()) return end_statement();
     other();
+  }
+
+  /// ZBrush's colours of vertices, in their order: "#MRGB " and eight hexadecimal digits of each,
+  /// two of them its mask.
+  void paint() {
+    if (std::string_view(p_, 6) != "#MRGB ") return;
+    const auto byte = [](const char* digits, std::uint8_t& value) {
+      return std::from_chars(digits, digits + 2, value, 16).ptr == digits + 2;
+    };
+    std::array<std::uint8_t, 4> mrgb{};
+    for (const char* p = p_ + 6;; p += 8) {
+      for (std::size_t i = 0; i < mrgb.size(); ++i) {
+        if (!byte(p + 2 * i, mrgb[i])) return;
+      }
+      block_.painted.push_back(glm::vec3(mrgb[1], mrgb[2], mrgb[3]) / 255.0f);
+    }
   }
 
   void position(std::ptrdiff_t keyword) {
@@ -688,6 +706,7 @@ void parse_obj_block(const char* text, std::size_t size, const ObjLimits* limits
   block.face_corners.reset(most);
   block.relative.clear();
   block.statements.clear();
+  block.painted.clear();
   block.notes = {};
   block.highest = {};
   block.highest_short = {};

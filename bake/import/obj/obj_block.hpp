@@ -116,6 +116,7 @@ struct ObjBlock {
   /// Entries (3 * corner + component) whose index counts from the start of the block (modulo 2^32).
   std::vector<std::uint32_t> relative;
   std::vector<ObjStatement> statements;
+  std::vector<glm::vec3> painted;  ///< of ZBrush's comments, 0 to 1
   NoteTallies notes{};
   ObjCounts highest;                           ///< greatest absolute index of a corner, plus one
   std::array<FourIndices, 3> highest_short{};  ///< of faces that are read at once, by lanes

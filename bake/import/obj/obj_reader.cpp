@@ -72,6 +72,7 @@ class ObjAssembler {
 
   SourceModel& model_;
   ObjMaterials materials_;
+  std::vector<glm::vec3> painted_;
   ObjCounts counts_;
   ObjCounts highest_;
   NoteTallies notes_{};
@@ -143,6 +144,7 @@ bool ObjAssembler::too_large() const {
 void ObjAssembler::add(ObjBlock& block) {
   resolve_relative(block);
   add_colours(block);
+  painted_.insert(painted_.end(), block.painted.begin(), block.painted.end());
   add_plane(block, block.corner_uvs, model_.corner_uvs);
   add_plane(block, block.corner_normals, model_.corner_normals);
   add_faces(block);
@@ -248,6 +250,15 @@ void ObjAssembler::apply(const ObjStatement& statement, std::uint64_t face) {
 
 /// Vertices without a colour among coloured ones are white; colours of 0 to 255 become 0 to 1.
 void ObjAssembler::finish_colours(const std::string& label) {
+  if (model_.colours.empty() && painted_.size() == model_.positions.size()) {
+    model_.colours.append(painted_.data(), painted_.size());
+  } else if (!painted_.empty()) {
+    model_.diagnostics.push_back({"obj.painted", DiagnosticSeverity::kWarning, label, 0,
+                                  std::to_string(painted_.size()) +
+                                      " colours in #MRGB comments do not belong to " +
+                                      std::to_string(model_.positions.size()) + " vertices",
+                                  "they are left out; export again"});
+  }
   std::uint64_t missing = 0;
   glm::vec3 least(0.0f);
   glm::vec3 most(0.0f);

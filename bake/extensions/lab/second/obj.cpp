@@ -119,6 +119,12 @@ class ObjReader {
       if (key == "v" && words.size() >= 7) mesh_.colours.push_back(three(4));
       if (key == "vt") mesh_.uvs.push_back({number(words, 1), number(words, 2)});
       if (key == "vn") mesh_.normals.push_back(three(1));
+    } else if (key == "#MRGB" && words.size() > 1) {
+      for (std::size_t i = 0; i + 8 <= words[1].size(); i += 8) {
+        const auto rgb = std::strtoul(words[1].substr(i, 8).c_str(), nullptr, 16);
+        mesh_.colours.emplace_back(rgb >> 16 & 255, rgb >> 8 & 255, rgb & 255);
+        mesh_.colours.back() /= 255.0;
+      }
     } else if (key == "f") {
       return add_face(words);
     } else if (key == "s") {
