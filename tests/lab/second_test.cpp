@@ -162,8 +162,11 @@ TEST_F(SecondTest, ColoursAreReadAsTheBakeReadsThem) {
   const std::string unlit = replaced(
       kGltf, R"("metallicFactor":0,"baseColorTexture":{"index":0}})",
       R"("metallicFactor":0,"baseColorFactor":[0.6,0.02,0.01,1]},"extensions":{"KHR_materials_unlit":{}})");
+  const std::string painted =
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\n#MRGB FFC8281EFFC8281EFF1428E6\nf 1 2 3\n";
   for (const auto& [name, text] :
        std::map<std::string, std::string>{{"bytes.obj", bytes},
+                                          {"painted.obj", painted},
                                           {"alpha.obj", alpha},
                                           {"unlit.gltf", unlit},
                                           {"words.obj", replaced(kObj, "box.mtl", "words.mtl")}}) {
@@ -188,6 +191,32 @@ TEST_F(SecondTest, PolygonsThatGoAroundAgainAreOneRound) {
       write("again.obj", replaced(kObj, "f 4 3 2 1\n", "f 4 3 2 1 4 3 2 1 4 3 2 1 4\n"));
   EXPECT_EQ(issues(path, path), Ids()) << details_;
   EXPECT_EQ(issues(write("box.obj", kObj), path), Ids()) << details_;
+}
+
+// Any triangulation of a polygon that is not flat is right; each of the five of a pentagon, and
+// both of each of two quadrangles, are in a file of triangles that is baked.
+TEST_F(SecondTest, BentPolygonsMayBeCutAlongAnyDiagonals) {
+  const std::string corners =
+      "v -5 0 5\nv 5 0 5\nv 5 0 -5\nv 0 5 -5\nv -5 0 -5\nv 15 8 5\nv 15 0 -5\n";
+  const std::string path = write("bent.obj", corners + "f 1 2 3 4 5\nf 2 6 7 3\n");
+  const auto cut = [&](const std::string& pentagon, const std::string& quadrangle) {
+    return issues(write("cut.obj", corners + pentagon + quadrangle), path, 0);
+  };
+  for (int i = 0; i < 5; ++i) {
+    const auto at = [&](int k) { return std::to_string((i + k) % 5 + 1) + " "; };
+    const std::string fan = "f " + at(0) + at(1) + at(2) + "\nf " + at(0) + at(2) + at(3) + "\nf " +
+                            at(0) + at(3) + at(4) + "\n";
+    for (const char* quadrangle : {"f 2 6 7\nf 2 7 3\n", "f 2 6 3\nf 6 7 3\n"}) {
+      const Ids ids = cut(fan, quadrangle);
+      EXPECT_FALSE(ids.contains("SOURCE_SURFACE") || ids.contains("SOURCE_COUNTS"))
+          << i << details_;
+    }
+    const Ids lost = cut(fan.substr(fan.find('\n') + 1), "f 2 6 7\nf 2 7 3\n");
+    EXPECT_TRUE(lost.contains("SOURCE_SURFACE")) << i;
+  }
+  // From above, its last corner is on an edge.
+  const std::string folded = write("folded.obj", corners + "s 1\nf 1 2 3 5 4\n");
+  EXPECT_EQ(issues(folded, folded), Ids()) << details_;
 }
 
 TEST_F(SecondTest, PicturesContinueAsSamplersSay) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include <unistd.h>
 #include <glm/common.hpp>
@@ -17,6 +18,7 @@
 #include "bake/export/room_models.hpp"
 #include "bake/image/resample.hpp"
 #include "bake/io/input.hpp"
+#include "bake/mesh/rays/triangle_tree.hpp"
 #include "bake/process/process.hpp"
 #include "formats/base/ranges.hpp"
 
@@ -121,6 +123,84 @@ Look look_of(const SecondModel& second, const ModelRecord& model) {
   return look;
 }
 
+/// Corners of a polygon whose triangulations are all looked at; the time grows with their cube.
+constexpr std::uint32_t kMostCorners = 32;
+
+/// Cosine to a polygon's normal of triangles that cover others. Lower: wrong cuts pass as bends.
+constexpr double kFolded = -0.5;
+
+/// Of a polygon's triangulations, the one whose inner edges are nearest to a surface.
+class NearestTriangles {
+ public:
+  NearestTriangles(std::span<const SecondCorner> corners, const ModelRecord& model,
+                   TriangleTree& surface)
+      : corners_(corners), count_(corners.size()), best_(count_ * count_), middle_(best_.size()) {
+    const glm::dvec3 center(model.center[0], model.center[1], model.center[2]);
+    glm::dvec3 up(0);
+    for (std::size_t i = 2; i < count_; ++i) up += twice_area(0, i - 1, i);
+    for (std::size_t step = 2; step < count_; ++step) {
+      for (std::size_t i = 0; i + step < count_; ++i) {
+        const std::size_t k = i + step;
+        Best best;
+        for (std::size_t j = i + 1; j < k; ++j) {
+          const double off = best_[i * count_ + j] + best_[j * count_ + k];
+          const glm::dvec3 area = twice_area(i, j, k);
+          const bool folded = glm::dot(area, up) <= kFolded * glm::length(area) * glm::length(up);
+          if (off < best.off && !folded) best = {off, j};
+        }
+        for (const double t : {0.25, 0.5, 0.75}) {
+          const glm::dvec3 at = glm::mix(corners[i].position, corners[k].position, t);
+          if (step + 1 < count_) best.off += surface.nearest((at - center) / model.scale);
+        }
+        best_[i * count_ + k] = best.off;
+        middle_[i * count_ + k] = best.middle;
+      }
+    }
+  }
+
+  /// Rewrites triangles, unless each triangulation is folded.
+  void put(std::array<SecondCorner, 3>* triangles) const {
+    if (std::isfinite(best_[count_ - 1])) put(0, count_ - 1, triangles);
+  }
+
+ private:
+  struct Best {
+    double off = std::numeric_limits<double>::infinity();
+    std::size_t middle = 0;
+  };
+
+  [[nodiscard]] glm::dvec3 twice_area(std::size_t i, std::size_t j, std::size_t k) const {
+    return glm::cross(corners_[j].position - corners_[i].position,
+                      corners_[k].position - corners_[i].position);
+  }
+
+  void put(std::size_t i, std::size_t k, std::array<SecondCorner, 3>*& triangles) const {
+    if (k < i + 2) return;
+    const std::size_t j = middle_[i * count_ + k];
+    *triangles++ = {corners_[i], corners_[j], corners_[k]};
+    put(i, j, triangles);
+    put(j, k, triangles);
+  }
+
+  std::span<const SecondCorner> corners_;
+  std::size_t count_;
+  std::vector<double> best_;         // of the part of the polygon from corner i to corner k
+  std::vector<std::size_t> middle_;  // of its triangle at the edge from i to k
+};
+
+/// Cuts polygons that are not flat as the surface is cut: a lost one has its area all the same.
+void follow(const TriMesh& surface, const ModelRecord& model, SecondModel& second) {
+  // Of many, each changes little.
+  if (second.polygons.size() > kLarge || surface.triangles.empty()) return;
+  TriangleTree tree(std::span(surface.positions.data(), surface.positions.size()),
+                    {surface.triangles.begin(), surface.triangles.end()});
+  for (const SecondPolygon& polygon : second.polygons) {
+    if (polygon.corners > kMostCorners) continue;
+    const std::span corners(&second.polygon_corners[polygon.first_corner], polygon.corners);
+    NearestTriangles(corners, model, tree).put(&second.triangles[polygon.first_triangle]);
+  }
+}
+
 /// Both are drawn without colours where only one knows them.
 void forget_colours(Look& look) {
   for (SourceMaterial& material : look.mesh.materials) material = SourceMaterial();
@@ -194,7 +274,7 @@ std::string ask(const std::string& reader, const std::string& path, double creas
 
 }  // namespace
 
-Result<void> check_second(const BundleView& bundle, std::uint32_t index, const SecondModel& second,
+Result<void> check_second(const BundleView& bundle, std::uint32_t index, SecondModel second,
                           const IssueSink& sink) {
   const ModelRecord& model = bundle.models()[index];
   const auto tell = [&](WorkstationRule rule, const std::string& detail) {
@@ -204,6 +284,7 @@ Result<void> check_second(const BundleView& bundle, std::uint32_t index, const S
                static_cast<std::uint64_t>(place - bundle.bytes().data()), detail});
   };
   MODAR_ASSIGN(Look ours, look_of(bundle, model));
+  follow(ours.mesh, model, second);
   Look theirs = look_of(second, model);
   const auto count = static_cast<double>(ours.mesh.triangles.size());
   const auto other = static_cast<double>(theirs.mesh.triangles.size());

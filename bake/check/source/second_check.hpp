@@ -15,7 +15,7 @@ inline constexpr const char* kSecondReader = "modar-second-reader";
 
 /// Compares a model's counts, area, volume and middle, and small pictures of it from 12 sides, in
 /// its colours without highlights. Reports SOURCE_COUNTS, SOURCE_SURFACE and SOURCE_COLOUR.
-Result<void> check_second(const BundleView& bundle, std::uint32_t model, const SecondModel& second,
+Result<void> check_second(const BundleView& bundle, std::uint32_t model, SecondModel second,
                           const IssueSink& sink);
 
 /// Reads the request's models by the program `reader`, and compares them. Reports SOURCE_READER

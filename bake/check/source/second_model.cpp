@@ -11,6 +11,8 @@ void visit(Model& model, const Part& part) {
   part(model.knows_colours);
   part(model.triangles);
   part(model.triangle_material);
+  part(model.polygons);
+  part(model.polygon_corners);
   std::uint64_t materials = model.materials.size();
   part(materials);
   if constexpr (!std::is_const_v<Model>) model.materials.resize(materials);

@@ -30,10 +30,19 @@ struct SecondCorner {
   glm::dvec3 colour{1};
 };
 
+/// A polygon that is not flat: any triangulation of it is right, and its triangles are one.
+struct SecondPolygon {
+  std::uint32_t first_triangle = 0;  ///< of two less than corners
+  std::uint32_t first_corner = 0;
+  std::uint32_t corners = 0;
+};
+
 struct SecondModel {
   bool knows_colours = true;  ///< false: the file states some that this reader does not know
   std::vector<std::array<SecondCorner, 3>> triangles;
   std::vector<std::uint32_t> triangle_material;
+  std::vector<SecondPolygon> polygons;
+  std::vector<SecondCorner> polygon_corners;
   std::vector<SecondMaterial> materials;
 };
 

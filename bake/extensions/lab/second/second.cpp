@@ -42,6 +42,21 @@ dvec3 direction(const dvec3& v) {
   return length > 0 && std::isfinite(length) ? v / length : dvec3(0);
 }
 
+/// Corners are off its plane by more than this part of its size. Less is not seen.
+constexpr double kBent = 1e-3;
+
+bool is_bent(const Mesh& mesh, const Face& face) {
+  const dvec3 up = direction(area_vector(mesh, face));
+  double off = 0;
+  double size = 0;
+  for (const Corner& corner : face.corners) {
+    const dvec3 step = place(mesh, corner) - place(mesh, face.corners[0]);
+    off = std::max(off, std::fabs(glm::dot(step, up)));
+    size = std::max(size, glm::length(step));
+  }
+  return off > kBent * size;
+}
+
 /// Cuts off corners that contain no other one, until three are left.
 template <class Add>
 void triangulate(const Mesh& mesh, const Face& face, const Add& add) {
@@ -110,6 +125,7 @@ class Finisher {
     model.materials = mesh_.materials;
     for (const Face& face : mesh_.faces) {
       const dvec3 normal = direction(area_vector(mesh_, face));
+      const std::size_t first = model.triangles.size();
       triangulate(mesh_, face, [&](std::size_t a, std::size_t b, std::size_t c) {
         std::array<SecondCorner, 3> triangle = {corner(face, a, normal), corner(face, b, normal),
                                                 corner(face, c, normal)};
@@ -121,6 +137,14 @@ class Finisher {
         model.triangles.push_back(triangle);
         model.triangle_material.push_back(face.material);
       });
+      const std::size_t count = face.corners.size();
+      if (model.triangles.size() - first != count - 2 || count < 4 || !is_bent(mesh_, face))
+        continue;
+      model.polygons.push_back({static_cast<std::uint32_t>(first),
+                                static_cast<std::uint32_t>(model.polygon_corners.size()),
+                                static_cast<std::uint32_t>(count)});
+      for (std::size_t i = 0; i < count; ++i)
+        model.polygon_corners.push_back(corner(face, i, normal));
     }
     return model;
   }
