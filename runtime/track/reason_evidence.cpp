@@ -15,16 +15,19 @@ constexpr int kSaturated = 250;
 constexpr double kDark = 16;
 // Share of saturated pixels from which a frame is overexposed. Lower takes bright walls for it.
 constexpr double kOverexposed = 0.6;
-// Ratio of the gradients of the strongest edges below which a frame is blurred. Higher takes soft
-// photos for it.
+// Ratio of the gradients of the strongest edges below which a frame is blurred, and below which one
+// is that lost a print in its middle. Higher takes soft photos for it.
 constexpr double kBlurredEdges = 0.36;
+constexpr double kLostEdges = 0.47;
 // Gradient that noise adds to the finer ones.
 constexpr double kNoiseEdge = 7;
 // Votes from which a place tells anything, and those that a glare leaves.
 constexpr int kPlaceVotes = 6;
 constexpr int kGlareVotes = 4;
-// Saturated share of a place from which glare hides it. Lower takes white paper for it.
+// Saturated share of a place from which glare hides it; half of it where more votes agree. Lower
+// takes white paper for it.
 constexpr double kGlare = 0.3;
+constexpr int kSureVotes = 8;
 // Saturated share of a frame that explains why a place failed its verification.
 constexpr double kGlareInFrame = 0.08;
 // Share of a place in the frame up to which it is at the edge.
@@ -188,19 +191,22 @@ Reason reason_of(Reason own, const ReasonEvidence& evidence) {
   if (evidence.saturated > kOverexposed) return Reason::kOverexposed;
   const bool seen = evidence.votes == LikelyPlace::kSeen;
   if (own == Reason::kNoFeatures || (own == Reason::kOutOfView && !seen)) return own;
-  if (seen && evidence.inside < kOutInside) return Reason::kOutOfView;
-  const double coarse = kBlurredEdges * evidence.coarse_edge;
+  // Features that agree on a pose, though a wrong one, show that a part is in view.
+  const bool failed = own == Reason::kFailedVerification;
+  if (seen && evidence.inside < kOutInside && !failed) return Reason::kOutOfView;
+  const double glare = evidence.votes >= kSureVotes ? 0.5 * kGlare : kGlare;
+  if (evidence.votes >= kGlareVotes && evidence.glare >= glare) return Reason::kGlare;
+  const bool lost = seen && evidence.inside > kEdgeInside && evidence.side > kSmall;
+  const double coarse = (lost ? kLostEdges : kBlurredEdges) * evidence.coarse_edge;
   if (coarse > kNoiseEdge &&
       evidence.edge * evidence.edge - kNoiseEdge * kNoiseEdge < coarse * coarse) {
     return seen ? Reason::kLostByBlur : Reason::kBlurred;
   }
-  if (evidence.votes >= kGlareVotes && evidence.glare >= kGlare) return Reason::kGlare;
   if (evidence.votes >= kPlaceVotes && evidence.inside <= kEdgeInside &&
       evidence.side <= kLargest) {
     return Reason::kAtTheEdge;
   }
   if (seen && evidence.side <= kSmall) return Reason::kTooSmall;
-  const bool failed = own == Reason::kFailedVerification;
   return failed && evidence.saturated >= kGlareInFrame ? Reason::kGlare : own;
 }
 
