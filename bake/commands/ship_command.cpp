@@ -109,6 +109,12 @@ Result<ExitCode> run_publish(ShipPublishCommand& command) {
   auto published = publish(command.request, key, stages);
   bar.clear();
   MODAR_ASSIGN(const PublishReport report, std::move(published));
+  if (report.release.expires <= std::time(nullptr)) {
+    std::fprintf(stderr,
+                 "warning: --expires %s: the time is past: devices refuse this release; publish "
+                 "again with a later one [ship.expired]\n",
+                 time_text(report.release.expires).c_str());
+  }
   if (command.json) {
     std::fputs(publish_json(report).c_str(), stdout);
   } else if (!command.quiet) {

@@ -112,6 +112,10 @@ Result<std::string> read_file(const std::string& path, std::size_t most) {
   if (std::error_code error; !file && std::filesystem::is_directory(path, error)) {
     return fail(ExitCode::kIo, "io.open", path, "it is a folder", "name a file in it");
   }
+  if (std::error_code error; !file && std::filesystem::exists(path, error) &&
+                             !std::filesystem::is_regular_file(path, error)) {
+    return fail(ExitCode::kIo, "io.open", path, "it is not a regular file", "name a file");
+  }
   if (!file) return unreadable();
   std::string bytes;
   char part[65536];

@@ -1161,7 +1161,8 @@ Result<FoundCorners> search(const RgbaImage& photo) {
   corners = refine(Gradients(rgb), corners, {1.2 * step, 1.2, 1.2});
   for (std::size_t i = 0; i < 4; ++i) {
     const Point corner = magnified(corners[i], fine);
-    if (!is_within(corner, photo)) return not_found("a corner of the object is outside the photo");
+    if (!is_within(corner, photo))
+      return not_found("a corner of what stands out is outside the photo");
     found.corners[i] = {corner.x, corner.y};
   }
   return found;
@@ -1280,9 +1281,10 @@ FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found)
   }
   const bool frontal = share > kLeastFrontal && is_upright(corners);
   // A scan has such edges within it; the photo of a print from straight above has them around it.
-  if (found->fills || !frontal || !found->clear()) picture.doubt = "";
+  const bool filled = found->fills && !unsharp;
+  if (filled || (!found->fills && (!frontal || !found->clear()))) picture.doubt = "";
   if (found->fills || frontal) {
-    if (*picture.doubt != 0) picture.doubt = "upright";
+    if (*picture.doubt != 0 && !found->fills) picture.doubt = "upright";
     return picture;
   }
   if (is_drawn(corners) && has_print_around(photo.image, corners)) {
@@ -1300,7 +1302,8 @@ FoundPicture find_picture(const Photo& photo, const Result<FoundCorners>& found)
 std::string_view doubt_words(std::string_view doubt) {
   if (doubt == "rivalled") return "there are several flat objects in the photo";
   if (doubt == "part") return "something flat stands out in it, which may be the picture";
-  if (doubt == "object") return "it shows an object on a background, but not all its four edges";
+  if (doubt == "object")
+    return "it shows an object on a background, and not all its four edges stand out";
   return doubt == "blurred"  ? "an edge is hidden or blurred"
          : doubt == "framed" ? "there are edges around or beyond them, perhaps those of the sheet"
          : doubt == "upright"

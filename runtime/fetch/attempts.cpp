@@ -177,7 +177,8 @@ Outcome Attempts::again(Transfer& transfer, const std::string& cause) {
                       transfer.fruitless == 1
                           ? cause
                           : cause + ", " + std::to_string(transfer.fruitless) + " times in a row",
-                      "run modar-fetch again: it resumes where it stopped"};
+                      "check address and network, and run modar-fetch again: it resumes where it "
+                      "stopped"};
     return Outcome::kFailed;
   }
   ++stats_.retries;

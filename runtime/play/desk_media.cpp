@@ -2,6 +2,7 @@
 #include "desk_media.hpp"
 
 #include <dlfcn.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -53,6 +54,12 @@ Result<const Media*> media() {
 Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input) {
   if (is_raw_input(input)) return open_raw_source(input);
   if (input == "camera" || input.starts_with("camera:")) return open_camera(input);
+  // OpenCV would wait for what is written into it.
+  struct stat status {};
+  if (stat(input.c_str(), &status) == 0 && S_ISFIFO(status.st_mode)) {
+    return fail(ExitCode::kUsage, "input.pipe", input, "it is a pipe",
+                "send raw frames through it: y4m:" + input + ", or nv21:640x480@30:" + input);
+  }
   MODAR_ASSIGN(const Media* library, media());
   return library->open_path(input);
 }

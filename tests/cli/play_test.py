@@ -359,6 +359,8 @@ class Play(ProgramTest):
         self.assertEqual(list(out.iterdir()), [])
         self.assert_fails(self.play(bundle, "--turntable", "2", "--out", "x.txt"), 1, "FILE.mp4, or a folder", "x.txt/")
         self.assertFalse((self.folder / "x.txt").exists())
+        os.mkfifo(self.folder / "pipe.mp4")  # nobody writes to it
+        self.assert_fails(self.play(bundle, "--input", "pipe.mp4", "--out", "piped"), 1, "it is a pipe", "y4m:pipe.mp4")
         (self.folder / "cut.nv21").write_bytes(bytes(99))
         self.assert_fails(self.play(bundle, "--input", "nv21:64x48:cut.nv21", "--out", "cut"), 3, "ends after 99 of 4608 bytes")
         self.assertFalse((self.folder / "cut").exists())

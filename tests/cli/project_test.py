@@ -445,6 +445,7 @@ class Strangers(ProjectTest):
             piped(name)
             done = self.modar("bake", *words, "-o", "y.modar", cwd=self.place)
             self.assertIn(done.returncode, (2, 3), (name, done.stderr))
+            self.assertIn("not a regular file", done.stderr, name)
         (self.place / "models/a.obj").unlink()
         (self.place / "models/a.obj").write_text(CUBE)
         for name in ("models/cube.mtl", "models/wall.png"):

@@ -665,6 +665,8 @@ class Refusals(ShipTest):
     def test_expiry(self):
         self.publish(self.shop.old)
         self.fetch_json()
+        late = self.modar("ship", "publish", self.shop.new, "--to", "late", "--key", self.shop.key, "--expires", "2020-01-01T00:00:00Z")
+        self.assertIn("2020-01-01T00:00:00Z: the time is past", late.stderr)
         self.publish(self.shop.new, options=["--expires", "2020-01-01T00:00:00Z"])
         self.assert_fails(self.fetch(), 12, "fetch.expired")
         self.assert_installed(self.shop.old)

@@ -400,6 +400,19 @@ TEST(FindPicture, AFigureThatIsTooUnsureToCutOutIsWarnedOf) {
   EXPECT_STREQ(find_picture(photo, found).doubt, "") << "7.5 % of the photo";
 }
 
+TEST(FindPicture, ABorderOfBackgroundIsNotThePicture) {
+  Photo photo;
+  photo.image = {1200, 900, {}};  // a camera's shape
+  FoundCorners found;
+  found.fills = true;
+  found.corners = {{{6, 20}, {1195, 5}, {1194, 892}, {4, 890}}};
+  found.sharpness = kDoubtfulSharpness;
+  EXPECT_STREQ(find_picture(photo, found).doubt, "");
+  found.sharpness = kDoubtfulSharpness - 0.001;
+  EXPECT_STREQ(find_picture(photo, found).doubt, "not-found");
+  EXPECT_FALSE(find_picture(photo, found).corners);
+}
+
 TEST(FindPicture, ACornerThatIsCutOffIsWarnedOf) {
   FoundCorners found;
   found.sharpness = found.quarter = found.divided = 1;

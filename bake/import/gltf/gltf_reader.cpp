@@ -476,7 +476,7 @@ void report_left_out(const tinygltf::Model& gltf, std::size_t animations, const 
       "sets of morph targets (at their default weights)");
   add(counts.hidden, "hidden node", "hidden nodes");
   add(counts.vertex_alphas, "primitive's opacity of vertices", "primitives' opacities of vertices");
-  add(counts.second_uvs, "second uv set", "second uv sets");
+  add(counts.second_uvs, "further uv set", "further uv sets");
   add(counts.lines_and_points, "primitive of lines or points", "primitives of lines or points");
   add(gltf.cameras.size(), "camera", "cameras");
   std::string extensions;
@@ -597,6 +597,7 @@ Result<SourceModel> read_gltf(const std::string& path, const ReadOptions& option
   MODAR_TRY(require_support(gltf, bytes, path));
   if (!good) {
     std::replace(error.begin(), error.end(), '\n', ' ');
+    error.erase(error.find_last_not_of(". ") + 1);
     return fail(
         ExitCode::kInvalidInput, "gltf.read", path,
         "it cannot be read as glTF 2.0: " + short_words(error),
