@@ -54,7 +54,7 @@ Result<const Media*> media() {
 Result<std::unique_ptr<FrameSource>> open_frame_source(const std::string& input) {
   if (is_raw_input(input)) return open_raw_source(input);
   if (input == "camera" || input.starts_with("camera:")) return open_camera(input);
-  // OpenCV would wait for what is written into it.
+  // OpenCV would wait for a writer.
   struct stat status {};
   if (stat(input.c_str(), &status) == 0 && S_ISFIFO(status.st_mode)) {
     return fail(ExitCode::kUsage, "input.pipe", input, "it is a pipe",

@@ -15,9 +15,10 @@ constexpr int kSaturated = 250;
 constexpr double kDark = 16;
 // Share of saturated pixels from which a frame is overexposed. Lower takes bright walls for it.
 constexpr double kOverexposed = 0.6;
-// Ratio of the gradients of the strongest edges below which a frame is blurred, and below which one
-// is that lost a print in its middle. Higher takes soft photos for it.
+// Ratio of the gradients of the strongest edges below which a frame is blurred. Higher takes soft
+// photos for it.
 constexpr double kBlurredEdges = 0.36;
+// The same of a frame that lost a print in its middle.
 constexpr double kLostEdges = 0.47;
 // Gradient that noise adds to the finer ones.
 constexpr double kNoiseEdge = 7;
