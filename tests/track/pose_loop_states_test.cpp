@@ -80,6 +80,36 @@ TEST(TrackerReason, FollowsFromTheEvidence) {
   EXPECT_EQ(reason_of(Reason::kNoGeometry, place(kSeen, 0.1, 1, 0)), Reason::kTooSmall);
   EXPECT_EQ(reason_of(Reason::kNoGeometry, place(20, 0.1, 1, 0)), Reason::kNoGeometry);
   EXPECT_EQ(reason_of(Reason::kNoGeometry, place(kSeen, 0.4, 0, 0)), Reason::kOutOfView);
+  EXPECT_EQ(reason_of(Reason::kFailedVerification, place(kSeen, 0.4, 0, 0)), Reason::kAtTheEdge);
+  EXPECT_EQ(reason_of(Reason::kNoGeometry, place(7, 0.4, 1, 0.2)), Reason::kNoGeometry);
+  EXPECT_EQ(reason_of(Reason::kNoGeometry, place(8, 0.4, 1, 0.2)), Reason::kGlare);
+  auto softer = place(kSeen, 0.4, 1, 0);
+  softer.edge = 40;  // corrected for noise 0.44 of the coarse ones
+  EXPECT_EQ(reason_of(Reason::kNoGeometry, softer), Reason::kLostByBlur);
+  softer.edge = 44;
+  EXPECT_EQ(reason_of(Reason::kNoGeometry, softer), Reason::kNoGeometry);
+  softer = place(20, 0.4, 1, 0.5);
+  softer.edge = 15;
+  EXPECT_EQ(reason_of(Reason::kFailedVerification, softer), Reason::kGlare) << "it softens edges";
+}
+
+TEST(TrackerRecord, CoarserLevelsAreMeansOfFourPixels) {
+  const auto pattern = tracker::view_tracked_pattern(record(), 0);
+  ASSERT_TRUE(pattern);
+  const auto levels = pattern->pyramid();
+  ASSERT_GE(levels.size(), 3u);
+  for (std::size_t i = 1; i < levels.size(); ++i) {
+    const GrayImage& fine = levels[i - 1];
+    const GrayImage& coarse = levels[i];
+    ASSERT_EQ(std::pair(coarse.width, coarse.height), std::pair(fine.width / 2, fine.height / 2));
+    for (int y = 0; y < coarse.height; ++y) {
+      for (int x = 0; x < coarse.width; ++x) {
+        const std::uint8_t* four = fine.pixels + 2 * y * fine.stride + 2 * x;
+        const int sum = four[0] + four[1] + four[fine.stride] + four[fine.stride + 1];
+        ASSERT_EQ(coarse.pixels[y * coarse.stride + x], (sum + 2) / 4) << i;
+      }
+    }
+  }
 }
 
 TEST(TrackerReason, FeaturesOfASmallPrintAgreeOverManyFrames) {
