@@ -63,8 +63,9 @@ struct PoseLoop::State {
 
   Camera camera;
   PoseLoopOptions options;
-  std::vector<TrackedPattern> patterns;  ///< the prints, then their further copies
-  std::vector<Track> tracks;             ///< one per pattern
+  std::vector<tracker::PatternPyramid> pyramids;  ///< of the patterns, by index
+  std::vector<TrackedPattern> patterns;           ///< the prints, then their further copies
+  std::vector<Track> tracks;                      ///< one per pattern
   std::vector<tracker::KnownCopy> known;
   tracker::FrameTracker frame_tracker;
   std::unique_ptr<tracker::SearchScheduler> search;
@@ -109,13 +110,13 @@ PoseLoop::~PoseLoop() = default;
   auto state = std::make_unique<State>(camera, options);
   const std::uint32_t count = bundle.patterns().size();
   const auto all = static_cast<std::uint32_t>(count + own.size());
-  const auto coarser = std::make_shared<std::vector<tracker::PatternPyramid>>(all);
+  state->pyramids = std::vector<tracker::PatternPyramid>(all);
   for (std::uint32_t i = 0; i < all; ++i) {
     const auto bytes = i < count ? bundle.section(SectionType::kTrackerRecord, i) : own[i - count];
     if (bytes.empty() && i < count) continue;
     const auto shape = i < count ? bundle.section(SectionType::kPatternShape, i) : OwnRecord{};
     MODAR_ASSIGN(const TrackedPattern pattern,
-                 tracker::view_tracked_pattern(bytes, i, shape, {coarser, &(*coarser)[i]}));
+                 tracker::view_tracked_pattern(bytes, i, state->pyramids[i], shape));
     state->patterns.push_back(pattern);
   }
   if (state->patterns.empty()) {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstring>
 #include <string>
-#include <utility>
 
 #include "formats/tracker_record.hpp"
 #include "kernels.hpp"
@@ -61,7 +60,11 @@ glm::dmat3 TrackedPattern::world_from_pixels() const {
 }
 
 std::span<const GrayImage> TrackedPattern::pyramid() const {
-  std::call_once(coarser->made, [this] { halve(image, level_count, *coarser); });
+  if (!coarser->made) {
+    const std::lock_guard lock(coarser->making);
+    if (!coarser->made) halve(image, level_count, *coarser);
+    coarser->made = true;
+  }
   return std::span(coarser->levels).first(static_cast<std::size_t>(level_count));
 }
 
@@ -73,8 +76,8 @@ glm::dvec3 TrackedPattern::on_surface(glm::dvec2 pixel) const {
 
 [[gnu::cold]] Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes,
                                                           std::uint32_t index,
-                                                          std::span<const std::byte> shape,
-                                                          std::shared_ptr<PatternPyramid> coarser) {
+                                                          PatternPyramid& coarser,
+                                                          std::span<const std::byte> shape) {
   std::uint32_t version = 0;
   if (bytes.size() >= sizeof version) std::memcpy(&version, bytes.data(), sizeof version);
   if (bytes.size() >= sizeof(TrackerRecordHeader) && version != kFeatureExtractorVersion) {
@@ -96,7 +99,7 @@ glm::dvec3 TrackedPattern::on_surface(glm::dvec2 pixel) const {
                static_cast<int>(view.header.height),
                static_cast<std::ptrdiff_t>(view.header.width)};
   out.level_count = static_cast<int>(view.header.level_count);
-  out.coarser = coarser != nullptr ? std::move(coarser) : std::make_shared<PatternPyramid>();
+  out.coarser = &coarser;
   view_patches(view, out);
   if (shape.empty()) return out;
   if (const char* cause =

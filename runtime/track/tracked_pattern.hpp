@@ -17,8 +17,8 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -42,7 +42,8 @@ inline constexpr std::size_t kMany = 8;
 
 /// Halvings of a pattern's image, which the record does not hold.
 struct PatternPyramid {
-  std::once_flag made;
+  std::mutex making;
+  std::atomic<bool> made = false;
   std::array<GrayImage, kMaxTrackerImageLevels> levels;
   std::vector<std::uint8_t> pixels;  ///< of all but the first
 };
@@ -58,9 +59,9 @@ struct TrackedPattern {
   std::span<const TrackerFeatureRecord> features;
   const std::uint8_t* codes = nullptr;
   std::array<std::span<const TrackerPatchRecord>, kMaxTrackerImageLevels> patches;  ///< by level
-  GrayImage image;                          ///< the record's
-  int level_count = 0;                      ///< of pyramid()
-  std::shared_ptr<PatternPyramid> coarser;  ///< of the image; copies share it
+  GrayImage image;                    ///< the record's
+  int level_count = 0;                ///< of pyramid()
+  PatternPyramid* coarser = nullptr;  ///< of the image; copies share it
   /// Those whose samples alias, see photometry.hpp; of many patterns measured at the first use.
   mutable std::optional<std::uint64_t> fine_cells;
   PatternSurface surface;
@@ -91,13 +92,12 @@ inline std::size_t count_of_prints(std::span<const TrackedPattern> patterns) {
   return count;
 }
 
-/// Views a section's bytes, which must outlive the pattern. Every count and offset is validated,
-/// and every feature and patch is within the image: nothing later checks again. Errors:
-/// kInvalidInput "tracker.record"; kUnsupported "tracker.record-version". shape: of a
-/// SectionType::kPatternShape section; none: flat. coarser: nothing was put in yet; none: one of
-/// its own.
+/// Views a section's bytes, which must outlive the pattern, as must `coarser`, its own. Every count
+/// and offset is validated, and every feature and patch is within the image: nothing later checks
+/// again. Errors: kInvalidInput "tracker.record"; kUnsupported "tracker.record-version". shape: of
+/// a SectionType::kPatternShape section; none: flat.
 Result<TrackedPattern> view_tracked_pattern(std::span<const std::byte> bytes, std::uint32_t index,
-                                            std::span<const std::byte> shape = {},
-                                            std::shared_ptr<PatternPyramid> coarser = nullptr);
+                                            PatternPyramid& coarser,
+                                            std::span<const std::byte> shape = {});
 
 }  // namespace modar::tracker

@@ -151,7 +151,8 @@ TEST(Prints, WhatIsConnectedWithPrintedDifferencesDiffers) {
   };
   for (const int at : {5, 7}) halves(own, at, true);
   const auto bytes = record_of(own);
-  const auto print = tracker::view_tracked_pattern(bytes, 0);
+  tracker::PatternPyramid coarser;
+  const auto print = tracker::view_tracked_pattern(bytes, 0, coarser);
   ASSERT_TRUE(print) << to_line(print.error());
   cv::Mat seen = own.clone();
   EXPECT_EQ(differences(*print, seen), 0);
@@ -177,7 +178,8 @@ TEST(Prints, WhatIsTooFineForACellIsComparedQuarterByQuarter) {
   };
   for (const int top : {0, 6}) strokes(own, 6, top, true);
   const auto bytes = record_of(own);
-  const auto print = tracker::view_tracked_pattern(bytes, 0);
+  tracker::PatternPyramid coarser;
+  const auto print = tracker::view_tracked_pattern(bytes, 0, coarser);
   ASSERT_TRUE(print) << to_line(print.error());
   EXPECT_EQ(differences(*print, own), 0);
   cv::Mat seen = own.clone();
@@ -424,7 +426,8 @@ TEST(Prints, WhatIsHalfCoveredStaysWhereItWasFound) {
 }
 
 TEST(Prints, APoseBesideThePatternHasSlippedUnlessSomethingCoversIt) {
-  const auto pattern = tracker::view_tracked_pattern(record(), 0);
+  tracker::PatternPyramid coarser;
+  const auto pattern = tracker::view_tracked_pattern(record(), 0, coarser);
   ASSERT_TRUE(pattern) << to_line(pattern.error());
   const Camera camera = default_camera(kWidth, kHeight);
   const auto extractor = FeatureExtractor::create(kWidth, kHeight, {});
@@ -451,7 +454,8 @@ TEST(Prints, APoseBesideThePatternHasSlippedUnlessSomethingCoversIt) {
 // As prints agree with others: here and there, and roughly. What covers a print leaves
 // whole parts of it unchanged.
 TEST(Prints, OneThatAgreesHereAndThereIsNotShown) {
-  const auto pattern = tracker::view_tracked_pattern(record(), 0);
+  tracker::PatternPyramid coarser;
+  const auto pattern = tracker::view_tracked_pattern(record(), 0, coarser);
   ASSERT_TRUE(pattern) << to_line(pattern.error());
   const Camera camera = default_camera(kWidth, kHeight);
   const auto extractor = FeatureExtractor::create(kWidth, kHeight, {});
@@ -511,10 +515,12 @@ cv::Mat code_grid(std::uint64_t seed) {
 TEST(Prints, AnotherGridOfThePitchIsNotShown) {
   const cv::Mat own = code_grid(1);
   const auto bytes = record_of(own);
-  const auto pattern = tracker::view_tracked_pattern(bytes, 0);
+  tracker::PatternPyramid coarser;
+  const auto pattern = tracker::view_tracked_pattern(bytes, 0, coarser);
   ASSERT_TRUE(pattern) << to_line(pattern.error());
   EXPECT_TRUE(tracker::regular(*pattern));
-  EXPECT_FALSE(tracker::regular(*tracker::view_tracked_pattern(record(), 0)));
+  tracker::PatternPyramid others;
+  EXPECT_FALSE(tracker::regular(*tracker::view_tracked_pattern(record(), 0, others)));
   const Camera camera = default_camera(kWidth, kHeight);
   const auto extractor = FeatureExtractor::create(kWidth, kHeight, {});
   tracker::PatchCache patches;

@@ -94,7 +94,8 @@ TEST(TrackerReason, FollowsFromTheEvidence) {
 }
 
 TEST(TrackerRecord, CoarserLevelsAreMeansOfFourPixels) {
-  const auto pattern = tracker::view_tracked_pattern(record(), 0);
+  tracker::PatternPyramid coarser;
+  const auto pattern = tracker::view_tracked_pattern(record(), 0, coarser);
   ASSERT_TRUE(pattern);
   const auto levels = pattern->pyramid();
   ASSERT_GE(levels.size(), 3u);

@@ -190,7 +190,8 @@ TEST(PoseLoop, FindsThePatternWhereItIs) {
 // pose up from there, though half of them is hidden.
 TEST(PoseLoop, GrowsAPoseFromTheFeaturesOfOneCorner) {
   const Camera camera = default_camera(640, 480);
-  const auto pattern = tracker::view_tracked_pattern(record(), 0);
+  tracker::PatternPyramid coarser;
+  const auto pattern = tracker::view_tracked_pattern(record(), 0, coarser);
   ASSERT_TRUE(pattern) << to_line(pattern.error());
   SceneBand band;
   band.area_low = 0.8;
