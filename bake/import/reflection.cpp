@@ -23,7 +23,8 @@ constexpr double kSomeMetal = 0.1;
 void set_reflection(double roughness, double metalness, const glm::dvec3& base, bool pictured,
                     SourceMaterial& material) {
   roughness = std::clamp(roughness, 0.05, 1.0);
-  metalness = std::clamp(metalness, 0.0, 1.0);
+  // As materials store it: what they round to none must not have the highlight of metal.
+  metalness = std::round(255 * std::clamp(metalness, 0.0, 1.0)) / 255;
   const double exponent = std::min(1000.0, 2.0 / std::pow(roughness, 4) - 2.0);
   // Of metal, before its colour; fainter where the drawn one is wider.
   const double drawn = std::min(exponent, static_cast<double>(kMostShininess));

@@ -457,7 +457,7 @@ TEST_F(Gltf, PicturesAndModesOfAlphaAreFoldedIntoTheColour) {
            "emissiveTexture":{"index":1},"emissiveFactor":[1,1,1],"occlusionTexture":{"index":2}},
           {"pbrMetallicRoughness":{"baseColorFactor":[1,0.5,0,1],"roughnessFactor":1,
            "metallicRoughnessTexture":{"index":3}},"emissiveTexture":{"index":1,"texCoord":1},
-           "emissiveFactor":[0.5,0,0]}],
+           "emissiveFactor":[0.5,0,0.5]}],
           "nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}])",
       one_triangle());
   ASSERT_TRUE(model) << to_line(model.error());
@@ -476,9 +476,11 @@ TEST_F(Gltf, PicturesAndModesOfAlphaAreFoldedIntoTheColour) {
   // sRGB 100 is 0.1274 in linear light; half of that, where all is occluded, is sRGB 71.
   EXPECT_EQ(pixels(5), (Bytes{0, 100, 255, 255, 0, 71, 0, 255}));
   EXPECT_EQ(model->materials[5].diffuse, glm::vec3(1.0f));
-  // Another set of coordinates: the factor alone stays. Roughness 0.4 is an exponent of 76.1.
+  // Another set of coordinates: the map's mean, (0, 0, 0.5) in linear light, times the factor; 0.25
+  // is sRGB 0.537. Roughness 0.4 is an exponent of 76.1.
   EXPECT_TRUE(model->materials[6].diffuse_map.empty());
-  EXPECT_GT(model->materials[6].emission.x, 0.7f);
+  EXPECT_EQ(model->materials[6].emission.x, 0.0f);
+  EXPECT_NEAR(model->materials[6].emission.z, 0.537f, 0.002f);
   EXPECT_NEAR(model->materials[6].shininess, 76.1f, 0.1f);
   // (n + 2) / 8 of the drawn exponent, 40, times 40 / 76.1, in sRGB; the colour comes later.
   EXPECT_NEAR(model->materials[6].specular.x, 1.555f, 0.005f);

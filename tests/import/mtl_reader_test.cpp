@@ -187,8 +187,9 @@ TEST_F(MtlReader, ReflectionFollowsFromWhatTheMaterialStates) {
       "newmtl matt\nKd 0.5\nnewmtl shiny\nKd 0.5\nKs 0.5\nNs 50\n"
       "newmtl mirror\nKd 0\nKs 1\nNs 50\nillum 3\n"
       "newmtl brass\nKd 0.9 0.8 0.5\nPr 0.4\nPm 1\nnewmtl chalk\nKd 0.9\nPr 1\nPm 0\n"
-      "newmtl leaf\nKd 0 0.5 0\nPr 1\nPm 0");
-  ASSERT_EQ(m.size(), 6u);
+      "newmtl leaf\nKd 0 0.5 0\nPr 1\nPm 0\n"
+      "newmtl wet\nKd 0 0.5 0\nPr 0.4\nPm 0\nnewmtl wetter\nKd 0 0.5 0\nPr 0.4\nPm 0.001");
+  ASSERT_EQ(m.size(), 8u);
   EXPECT_EQ(m[0].reflectance, 0.0f);
   EXPECT_FLOAT_EQ(m[1].reflectance, 0.04f) << "glTF 2.0, appendix B";
   EXPECT_FLOAT_EQ(m[2].reflectance, 1.0f);
@@ -196,6 +197,7 @@ TEST_F(MtlReader, ReflectionFollowsFromWhatTheMaterialStates) {
   EXPECT_NEAR(m[3].shininess, 76.1f, 0.1f);  // 2 / 0.4^4 - 2
   EXPECT_EQ(m[4].reflectance, 0.0f) << "nothing of it would be seen";
   EXPECT_FLOAT_EQ(m[5].reflectance, 0.04f) << "it is seen in red and blue";
+  EXPECT_EQ(m[6].specular, m[7].specular) << "a bundle has steps of 1/255 of metalness";
 }
 
 TEST_F(MtlReader, APictureAloneIsSeenAsItIs) {

@@ -17,6 +17,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include "bake/image/image.hpp"
 #include "bake/import/conversion.hpp"
 #include "bake/import/gltf/gltf_pictures.hpp"
 #include "bake/import/gltf/tinygltf_library.hpp"
@@ -25,6 +26,7 @@
 #include "bake/import/read_model.hpp"
 #include "bake/import/reflection.hpp"
 #include "formats/base/atomic_file.hpp"
+#include "formats/base/colour.hpp"
 #include "formats/base/leftover.hpp"
 
 namespace modar {
@@ -82,6 +84,17 @@ const char* picture_ending(const std::vector<unsigned char>& bytes, const std::s
   if (start.starts_with("\xFF\xD8")) return ".jpg";
   if (start.starts_with("RIFF")) return ".webp";
   return stated == "image/ktx2" ? ".ktx2" : ".png";
+}
+
+/// Mean of a picture in linear light; black where it cannot be read.
+glm::dvec3 mean_light(const std::string& path) {
+  const Result<RgbaImage> image = read_texture(path);
+  glm::dvec3 sum(0.0);
+  if (!image) return sum;
+  for (std::size_t i = 0; i < image->pixels.size(); ++i) {
+    if (i % 4 != 3) sum[static_cast<int>(i % 4)] += linear_of_srgb(image->pixels[i] / 255.0);
+  }
+  return sum / (static_cast<double>(image->pixels.size()) / 4);
 }
 
 /// The part of opacity that a material gives up where all light goes through it. By eye: clear
@@ -248,8 +261,8 @@ class MaterialReader {
     add("gltf.emissive-map", emissive_.folded,
         "have an emissive map, which is added to the base colour and then lit");
     add("gltf.emissive-map", emissive_.left_out,
-        "have an emissive map with other texture coordinates than the base colour, which is "
-        "ignored");
+        "have an emissive map with other texture coordinates than the base colour, whose mean is "
+        "emitted");
     add("gltf.occlusion-map", occlusion_.folded,
         "have an occlusion map; the base colour is darkened by half of it");
     add("gltf.occlusion-map", occlusion_.left_out,
@@ -326,6 +339,13 @@ class MaterialReader {
       ++(path.empty() ? count.left_out : count.folded);
     };
     take(source.emissiveTexture, pictures.emissive, emissive_);
+    if (pictures.emissive.empty() && source.emissiveTexture.index >= 0) {
+      const glm::dvec3 mean = mean_light(image_path(source.emissiveTexture.index));
+      for (int i = 0; i < 3; ++i) {
+        m.emission[i] = static_cast<float>(
+            stored_light(mean[i] * factor(source.emissiveFactor, std::size_t(i), 0.0)));
+      }
+    }
     take(source.occlusionTexture, pictures.occlusion, occlusion_);
     if (!pictures.occlusion.empty()) {
       pictures.occlusion_strength = source.occlusionTexture.strength;
