@@ -40,7 +40,7 @@ void main() {
 #endif
 #endif
 #ifdef COLOURED
-  base *= v_colour;
+  base *= vec4(sqrt(v_colour.rgb), v_colour.a);
 #endif
   base.rgb *= v_light;
 #ifdef SHINY

@@ -73,7 +73,7 @@ uniform vec4 u_key_colour;
 uniform vec4 u_diffuse;
 varying vec3 v_light;
 #ifdef SHINY
-// In linear light, the exponent in w.
+// In linear light; w: the square of GGX's alpha.
 uniform vec4 u_specular;
 // w: metalness.
 uniform vec4 u_emission;
@@ -90,6 +90,7 @@ varying vec2 v_uv;
 #endif
 #ifdef COLOURED
 attribute vec4 a_colour;
+// Squares of sRGB, near linear light, in which colours are mixed.
 varying vec4 v_colour;
 #endif
 
@@ -191,17 +192,24 @@ void main() {
   vec3 added = u_emission.rgb;
 #if defined(NORMAL_XYZ) || defined(NORMAL_OCT)
   ray = normalize(ray);
-  vec3 mirrored = sky_along(reflect(ray, n), u_mirror.xy);
+  float alpha = sqrt(u_specular.w);
+  // Rough surfaces mirror the room nearer to their normal.
+  vec3 mirrored = sky_along(normalize(mix(reflect(ray, n), n, alpha)), u_mirror.xy);
 #ifdef NORMAL_XYZ
   mirrored *= 0.5 + 0.5 * a_normal.w;
 #endif
   // Schlick's approximation of Fresnel's equations.
-  float e = 1.0 - abs(dot(n, ray));
+  float view = abs(dot(n, ray));
+  float e = 1.0 - view;
   added += mirrored * (u_mirror.z + u_mirror.w * e * e * e * e * e);
-  vec3 halfway = normalize(u_key.xyz - ray);
-  vec3 shine = u_specular.rgb * pow(max(dot(n, halfway), 0.0001), u_specular.w);
+  // GGX's lobe, 1 where all directions are one, and Hammon's approximation of its masking.
+  float to_key = max(dot(n, u_key.xyz), 0.0);
+  float halfway = max(dot(n, normalize(u_key.xyz - ray)), 0.0);
+  float lobe = u_specular.w / (1.0 - (1.0 - u_specular.w) * halfway * halfway);
+  vec3 shine = u_specular.rgb * (lobe * lobe * 2.0 * to_key /
+                                 max(mix(2.0 * to_key * view, to_key + view, alpha), 0.05));
   added += u_share * shine;
-  light = mix(light, mirrored + shine, u_emission.w);
+  light = mix(light, mirrored * (1.0 - 0.25 * alpha) + shine, u_emission.w);
 #endif
   vec3 stored = max(1.055 * pow(max(added, 0.0001), vec3(1.0 / 2.4)) - 0.055, 0.0);
   v_shine = stored * stored;
@@ -211,6 +219,6 @@ void main() {
   v_uv = a_uv * uv_map.xy + uv_map.zw;
 #endif
 #ifdef COLOURED
-  v_colour = a_colour;
+  v_colour = vec4(a_colour.rgb * a_colour.rgb, a_colour.a);
 #endif
 }

@@ -12,7 +12,7 @@ namespace modar {
 inline constexpr double kDielectricReflectance = 0.04;
 
 /// Sets specular, shininess, reflectance and metalness of a material whose base colour is linear
-/// and may be multiplied by a picture: the highlight of Blinn and Phong that is as wide as the
+/// and may be multiplied by a picture: the highlight of GGX that is as wide as the
 /// roughness makes it. Where nothing of it would be seen, they become 0, which costs a device less.
 /// roughness, metalness: 0 to 1, others are clamped.
 void set_reflection(double roughness, double metalness, const glm::dvec3& base, bool pictured,

@@ -40,8 +40,7 @@ RoomLight neutral_room() {
 
 glm::vec4 mirror_factors(float shininess, float reflectance, float metalness) {
   // The sky's polynomials are weakened to 2/3 and 1/4 of its radiance; a lobe cos^s with s = n / 4
-  // about the mirrored ray weakens them by (s + 1) / (s + 2) and s / (s + 3). Less than 4: surfaces
-  // this rough mirror wider lobes towards their normal.
+  // about the mirrored ray weakens them by (s + 1) / (s + 2) and s / (s + 3).
   const float n = std::max(shininess, 4.0f);
   const float roughness = std::sqrt(std::sqrt(2.0f / (shininess + 2.0f)));
   // Rough surfaces mirror less: fits of Karis' approximation ("Physically Based Shading on Mobile",
@@ -50,7 +49,7 @@ glm::vec4 mirror_factors(float shininess, float reflectance, float metalness) {
   const float dielectric = reflectance > 0.0f ? 1.0f - metalness : 0.0f;
   return {1.5f * (n + 4.0f) / (n + 8.0f), 4.0f * n / (n + 12.0f),
           reflectance * dielectric * (0.45f + 0.55f * smooth),
-          dielectric * smooth * smooth * smooth};
+          (reflectance > 0.0f ? 1.0f - 0.5f * metalness : 0.0f) * smooth * smooth * smooth};
 }
 
 RoomLight light_of_record(const LightRecord& record) {

@@ -321,7 +321,7 @@ void ModelPainter::set_material(const PaintJob& job, ProgramState& state, const 
     const float metalness = material_share(record.flags, kMaterialMetalness);
     glm::vec4 specular = linear_colour(record.specular, shining ? 1.0f : 0.0f, 0.0f) *
                          lights_.key_colour(piece.light);
-    specular.w = shining ? std::min(record.shininess, kMostShininess) : 1.0f;
+    specular.w = 2.0f / (std::min(record.shininess, kMostShininess) + 2.0f);
     set_vector(program.specular, specular, job.stats);
     set_vector(program.emission, linear_colour(record.emission, 1.0f, metalness), job.stats);
     const float reflectance = material_share(record.flags, kMaterialReflectance);

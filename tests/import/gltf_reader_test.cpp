@@ -482,10 +482,13 @@ TEST_F(Gltf, PicturesAndModesOfAlphaAreFoldedIntoTheColour) {
   EXPECT_EQ(model->materials[6].emission.x, 0.0f);
   EXPECT_NEAR(model->materials[6].emission.z, 0.537f, 0.002f);
   EXPECT_NEAR(model->materials[6].shininess, 76.1f, 0.1f);
-  // (n + 2) / 8 of the drawn exponent, 40, times 40 / 76.1, in sRGB; the colour comes later.
-  EXPECT_NEAR(model->materials[6].specular.x, 1.555f, 0.005f);
+  // (n + 2) / 8 of the drawn exponent, 40, times (40 / 76.1)^(1/2), in sRGB; the colour comes
+  // later.
+  EXPECT_NEAR(model->materials[6].specular.x, 1.786f, 0.005f);
   EXPECT_EQ(model->materials[6].specular.z, model->materials[6].specular.x);
-  EXPECT_EQ(model->materials[0].shininess, 0.0f);
+  // glTF 2.0, 5.22: metal of roughness 1 where a file states nothing.
+  EXPECT_EQ(model->materials[0].metalness, 1.0f);
+  EXPECT_LT(model->materials[0].shininess, 0.2f);
   std::vector<std::string> ids;
   for (const Diagnostic& d : model->diagnostics) ids.push_back(d.id);
   std::sort(ids.begin(), ids.end());
@@ -530,7 +533,7 @@ TEST_F(Gltf, PicturesOfWhatIsLitMirrorLightInTheirDarkPlaces) {
       << "a picture is lit all the same";
   EXPECT_EQ(model->materials[3].emission, glm::vec3(1, 0, 0)) << "a colour is not";
   EXPECT_EQ(model->materials[3].diffuse, glm::vec3(0.0f));
-  EXPECT_EQ(model->materials[2].metalness, 0.0f) << "a file that states nothing means no metal";
+  EXPECT_EQ(model->materials[2].metalness, 1.0f) << "glTF 2.0, 5.22: the default";
 }
 
 TEST_F(Gltf, FacesThatAMapCallsMetalAreAMaterialOfTheirOwn) {

@@ -23,7 +23,7 @@ struct ShadedVertex {
   glm::dvec3 light{1.0};     ///< linear
   glm::dvec3 added{0.0};     ///< linear
   glm::dvec2 uv{0.0};
-  glm::dvec4 colour{1.0};
+  glm::dvec4 colour{1.0};  ///< linear
 };
 
 /// Texel of a level, wrapped or clamped.
@@ -154,26 +154,36 @@ class Canvas {
     const glm::dvec3 to_key = glm::normalize(glm::dvec3(light_.direction));
     const glm::dvec3 halfway = glm::normalize(to_key - glm::normalize(to_world_ * eye));
     const glm::dvec3 key = glm::dvec3(light_.key) * static_cast<double>(options_.light_strength);
-    const double shine = m.shininess > 0
-                             ? std::pow(std::max(glm::dot(world, halfway), 1e-4),
-                                        static_cast<double>(std::min(m.shininess, kMostShininess)))
-                             : 0.0;
     const glm::dvec3 ray = glm::normalize(to_world_ * eye);
+    const double view = std::fabs(glm::dot(world, ray));
+    const double to_light = std::max(glm::dot(world, to_key), 0.0);
+    // Of GGX's lobe, the square of its alpha.
+    const double square = 2 / (static_cast<double>(std::min(m.shininess, kMostShininess)) + 2);
+    const double alpha = std::sqrt(square);
+    const double lobe =
+        square / (1 - (1 - square) * std::pow(std::max(glm::dot(world, halfway), 0.0), 2));
+    const double masked = glm::mix(2 * to_light * view, to_light + view, alpha);
+    const double shine =
+        m.shininess > 0 ? lobe * lobe * 2 * to_light / std::max(masked, 0.05) : 0.0;
     const glm::dvec4 factors(mirror_factors(m.shininess, m.reflectance, m.metalness));
-    const glm::dvec3 mirrored = sky(glm::reflect(ray, world), factors.x, factors.y);
-    const double edge = std::pow(1 - std::min(std::fabs(glm::dot(world, ray)), 1.0), 5.0);
+    const glm::dvec3 along = glm::normalize(glm::mix(glm::reflect(ray, world), world, alpha));
+    const glm::dvec3 mirrored = sky(along, factors.x, factors.y);
+    const double edge = std::pow(1 - std::min(view, 1.0), 5.0);
     ShadedVertex lit;
     const glm::dvec3 diffuse = srgb_to_linear(glm::dvec3(m.diffuse));
-    lit.light = srgb_to_linear(ambient_colour(m)) * sky(world, 1, 1) +
-                diffuse * key * std::max(glm::dot(world, to_key), 0.0);
+    lit.light = srgb_to_linear(ambient_colour(m)) * sky(world, 1, 1) + diffuse * key * to_light;
     const glm::dvec3 highlight = srgb_to_linear(glm::dvec3(m.specular)) * key * shine;
     const auto metalness = static_cast<double>(m.metalness);
     const double share = metalness > 0 ? static_cast<double>(m.reflectance) * (1 - metalness) : 1.0;
-    lit.light = glm::mix(lit.light, diffuse * (mirrored + highlight), metalness);
+    lit.light =
+        glm::mix(lit.light, diffuse * (mirrored * (1 - 0.25 * alpha) + highlight), metalness);
     lit.added = srgb_to_linear(glm::dvec3(m.emission)) + share * highlight +
                 mirrored * (factors.z + factors.w * edge);
     if (!mesh_.uvs.empty()) lit.uv = mesh_.uvs[v];
-    if (!mesh_.colours.empty()) lit.colour = glm::dvec4(mesh_.colours[v]) / 255.0;
+    if (!mesh_.colours.empty()) {
+      lit.colour = glm::dvec4(mesh_.colours[v]) / 255.0;
+      lit.colour = glm::dvec4(srgb_to_linear(glm::dvec3(lit.colour)), lit.colour.a);
+    }
     if (eye.z >= 0) return lit;
     lit.inverse_depth = -1.0 / eye.z;
     lit.x = camera_.cx + camera_.fx * eye.x * lit.inverse_depth;
@@ -230,10 +240,10 @@ class Canvas {
       const double texels = std::max({slope(step_x), slope(step_y), 1e-9});
       const glm::dvec4 texel = look_up(texture, uv, std::log2(texels));
       if (texel.a < 0.5) return;
-      base *= glm::dvec4(glm::dvec3(texel), 1.0);
+      base *= glm::dvec4(srgb_to_linear(glm::dvec3(texel)), 1.0);
     }
     depth_[at] = near;
-    const glm::dvec3 albedo = srgb_to_linear(glm::dvec3(base));
+    const glm::dvec3 albedo(base);
     const auto seen_at = [&](const ShadedVertex& lit) {
       return linear_to_srgb(albedo * lit.light + lit.added);
     };

@@ -344,12 +344,15 @@ class PathTracer::Scene {
           weights.x * mesh.uvs[p] + weights.y * mesh.uvs[q] + weights.z * mesh.uvs[r];
       base = look_up(scene_.textures[material], uv, level);
     }
+    base = glm::dvec4(srgb_to_linear(glm::dvec3(base)), base.w);
     if (!mesh.colours.empty()) {
-      base *= (weights.x * glm::dvec4(mesh.colours[p]) + weights.y * glm::dvec4(mesh.colours[q]) +
-               weights.z * glm::dvec4(mesh.colours[r])) /
-              255.0;
+      const auto linear = [&](std::uint32_t v) {
+        const glm::dvec4 colour = glm::dvec4(mesh.colours[v]) / 255.0;
+        return glm::dvec4(srgb_to_linear(glm::dvec3(colour)), colour.w);
+      };
+      base *= weights.x * linear(p) + weights.y * linear(q) + weights.z * linear(r);
     }
-    s.albedo = srgb_to_linear(glm::dvec3(base)) * srgb_to_linear(glm::dvec3(m.diffuse));
+    s.albedo = glm::dvec3(base) * srgb_to_linear(glm::dvec3(m.diffuse));
     s.alpha = base.w * static_cast<double>(m.opacity);
     s.emission = srgb_to_linear(glm::dvec3(m.emission));
     s.specular = m.shininess > 0 ? srgb_to_linear(glm::dvec3(m.specular)) : glm::dvec3(0.0);

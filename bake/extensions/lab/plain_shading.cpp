@@ -90,7 +90,7 @@ void main() {
   vec2 cosines = vec2(dot(n, kLight), dot(n, halfway));
   cosines = max(mix(cosines, abs(cosines), u_diffuse.w), 0.0);
   diffuse = cosines.x;
-  shine = pow(cosines.y + 0.0001, u_specular.w);
+  shine = pow(cosines.y + 0.0001, 2.0 / u_specular.w - 2.0);
 #endif
   v_light = vec3(0.06) + 0.7 * u_diffuse.rgb * diffuse;
   v_shine = sqrt(u_emission.rgb) + sqrt(u_specular.rgb) * shine;
